@@ -1,0 +1,171 @@
+"""The parts of the MicroPython build that need neither network nor compiler."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bubbleskin.errors import BubbleskinError
+from bubbleskin.sim import interpreter
+
+TOOL = Path(__file__).parents[2] / "tools" / "build_micropython.py"
+spec = importlib.util.spec_from_file_location("build_micropython", TOOL)
+assert spec
+assert spec.loader
+tool = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(tool)
+
+DEB822 = """\
+# the archive
+Types: deb
+URIs: http://mirror.example/debian
+Suites: bookworm bookworm-updates
+Components: main contrib
+Architectures: amd64
+Signed-By: /usr/share/keyrings/archive.gpg
+
+Types: deb
+URIs: http://mirror.example/debian-security
+Suites: bookworm-security
+Components: main
+Signed-By: /usr/share/keyrings/archive.gpg
+
+Types: deb
+URIs: http://vendor.example/apt
+Suites: bookworm
+Components: stable
+
+Enabled: no
+Types: deb
+URIs: http://off.example/debian
+Suites: bookworm
+Components: main
+"""
+
+ONE_LINE = """\
+# deb http://commented.example/debian bookworm main
+deb cdrom:[Debian]/ bookworm main
+deb [arch=amd64 signed-by=/usr/share/keyrings/archive.gpg] http://mirror.example/debian bookworm main contrib
+deb-src [signed-by=/usr/share/keyrings/archive.gpg] http://mirror.example/debian bookworm main # and source
+deb http://mirror.example/debian bookworm-updates main
+deb http://flat.example/ ./
+"""
+
+TRIXIE = """\
+Types: deb-src
+Suites: trixie
+Components: main
+Uris: http://mirror.example/debian
+Signed-By: /usr/share/keyrings/archive.gpg
+"""
+
+
+def program(path: Path, answer: str) -> Path:
+    """An executable that says `answer` whatever it is asked."""
+    path.write_text(f"#!/bin/sh\necho '{answer}'\n")
+    path.chmod(0o755)
+    return path
+
+
+@pytest.mark.parametrize("stanzas", [tool.read_deb822(DEB822), tool.read_one_line(ONE_LINE)])
+def test_only_the_debian_archive_is_turned_to_the_other_suite(stanzas):
+    assert tool.turn_to_suite(stanzas, "trixie") == TRIXIE
+
+
+def test_a_key_written_into_the_sources_file_is_kept():
+    text = DEB822.replace("/usr/share/keyrings/archive.gpg", "\n -----BEGIN\n .\n mQIN\n -----END", 1)
+    assert "Signed-By: \n -----BEGIN\n .\n mQIN\n -----END\n" in tool.turn_to_suite(
+        tool.read_deb822(text), "trixie"
+    )
+
+
+def test_a_source_without_a_key_gets_debians_own(monkeypatch, tmp_path):
+    keyring = tmp_path / "debian.gpg"
+    keyring.touch()
+    monkeypatch.setattr(tool, "KEYRING", keyring)
+    stanzas = tool.read_one_line("deb http://mirror.example/debian bullseye main")
+    assert f"Signed-By: {keyring}\n" in tool.turn_to_suite(stanzas, "trixie")
+
+
+def test_the_key_of_a_build_names_version_and_word_size_and_follows_the_options(monkeypatch):
+    before = interpreter.build_key()
+    assert before.startswith("1.25.0-32bit-")
+    monkeypatch.setattr(interpreter, "BUILD_OPTIONS", (*interpreter.BUILD_OPTIONS, "MICROPY_PY_THREAD=0"))
+    assert interpreter.build_key() != before
+
+
+def test_what_micropython_names_comes_before_what_was_built(monkeypatch, tmp_path):
+    monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path))
+    monkeypatch.delenv("MICROPYTHON", raising=False)
+    with pytest.raises(BubbleskinError, match=r"tools/build_micropython\.py.* or set MICROPYTHON"):
+        interpreter.find_micropython()
+    interpreter.build_folder().mkdir(parents=True)
+    built = program(interpreter.build_folder() / "micropython", "built")
+    assert interpreter.find_micropython() == built
+    own = program(tmp_path / "own", "own")
+    monkeypatch.setenv("MICROPYTHON", str(own))
+    assert interpreter.find_micropython() == own
+
+
+def test_a_wrong_micropython_is_named(monkeypatch, tmp_path):
+    monkeypatch.setenv("MICROPYTHON", str(tmp_path / "nowhere"))
+    with pytest.raises(BubbleskinError, match="nowhere, which is not a file"):
+        interpreter.find_micropython()
+    (tmp_path / "plain").touch()
+    monkeypatch.setenv("MICROPYTHON", str(tmp_path / "plain"))
+    with pytest.raises(BubbleskinError, match="plain, which is not executable"):
+        interpreter.find_micropython()
+
+
+def test_an_interpreter_that_differs_from_the_rp2040_is_refused(tmp_path):
+    assert tool.prove(program(tmp_path / "right", "-9 True True 1.25.0")) == "1.25.0"
+    with pytest.raises(BubbleskinError, match=r"is MicroPython 1\.25\.0, but not a 32-bit build"):
+        tool.prove(program(tmp_path / "wide", "8589934583 True False 1.25.0"))
+    with pytest.raises(BubbleskinError, match="is not a MicroPython with viper"):
+        tool.prove(Path(sys.executable))
+
+
+def test_the_interpreter_of_this_machine_is_like_the_rp2040():
+    try:
+        path = interpreter.find_micropython()
+    except BubbleskinError as problem:
+        pytest.skip(str(problem))
+    assert tool.prove(path)
+
+
+def test_machines_that_cannot_build_are_told_why():
+    assert tool.unsupported("Linux", "x86_64") is None
+    assert "this is Darwin" in tool.unsupported("Darwin", "arm64")
+    assert "this one is aarch64" in tool.unsupported("Linux", "aarch64")
+
+
+def test_a_checkout_without_micropython_is_refused_before_anything_is_fetched(monkeypatch, tmp_path):
+    monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(tool, "unsupported", lambda system, machine: None)
+    with pytest.raises(BubbleskinError, match=r"not a MicroPython checkout.*\n.*MICROPYTHON="):
+        tool.micropython(tmp_path)
+    assert not (tmp_path / "cache").exists()
+
+
+def test_the_tool_says_one_sentence_and_fails(tmp_path):
+    environment = {**os.environ, "MICROPYTHON": str(tmp_path / "nowhere")}
+    run = subprocess.run([sys.executable, TOOL, "--print"], env=environment, capture_output=True, text=True)
+    assert run.returncode == 1
+    assert run.stdout == ""
+    assert len(run.stderr.splitlines()) == 1
+    assert "nowhere" in run.stderr
+
+
+def test_a_failed_step_shows_the_end_of_its_log(tmp_path):
+    steps = tool.Steps(tmp_path)
+    script = "for line in range(30): print('line', line)\nraise SystemExit(3)"
+    with pytest.raises(BubbleskinError) as failure:
+        steps.run("Counting", [sys.executable, "-c", script])
+    text = str(failure.value)
+    assert "line 29" in text
+    assert "line 10" in text
+    assert "line 9\n" not in text
+    assert str(tmp_path / "counting.log") in text
