@@ -71,6 +71,12 @@ class Table:
                     f"a knot's {name} is an unsigned 16-bit number of {unit}, 0 to {limit}; "
                     f"this table has {values.min()} to {values.max()}."
                 )
+        product = np.abs(np.diff(h) * np.diff(p))
+        if product.max() >= 2**31:
+            raise InvalidInput(
+                f"knots {int(np.argmax(product))} and the next are so far apart that the firmware's 32-bit "
+                "interpolation would overflow: put a knot between them."
+            )
         h.setflags(write=False)
         p.setflags(write=False)
         object.__setattr__(self, "height_um", h)
