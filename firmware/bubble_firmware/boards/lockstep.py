@@ -1,0 +1,94 @@
+"""Hands of a board whose hardware is at the other end of a pipe, in lockstep: a tick begins when its input has come.
+
+All words are little-endian and blocks have a fixed size, the link's bytes at their end:
+    into the firmware, per tick: u16 size of the link's bytes, u16 counts (per bubble, then the supply's), LINK_IN bytes
+    out of it, per tick: u16 size of the link's bytes, u16 pulses (fill and vent per bubble), u16 pump, u16 dump, LINK_OUT bytes
+"""
+
+import sys
+
+LINK_IN = 256
+LINK_OUT = 1024
+
+
+class Hands:
+    """What `bubble_firmware.app` calls, on stdin and stdout of this interpreter."""
+
+    late_ticks = 0
+
+    def __init__(self, bubbles, boot_id):
+        self.boot_id = boot_id
+        self._stdin = sys.stdin.buffer
+        self._stdout = sys.stdout.buffer
+        self._in = bytearray(2 + 2 * (bubbles + 1) + LINK_IN)
+        self._out = bytearray(2 + 4 * bubbles + 4 + LINK_OUT)
+        self._link_in = len(self._in) - LINK_IN
+        self._link_out = len(self._out) - LINK_OUT
+        self._sent = 0
+        self._ticked = False
+
+    def wait(self):
+        """Hand over what the last tick decided and wait for the next; False when the pipe has closed."""
+        if self._ticked:
+            out = self._out
+            _put(out, 0, self._sent)
+            self._stdout.write(out)
+            self._sent = 0
+        self._ticked = True
+        return self._stdin.readinto(self._in) == len(self._in)
+
+    def sense(self, counts):
+        """Fill in the counts of this tick."""
+        block = self._in
+        for index in range(len(counts)):
+            at = 2 + 2 * index
+            counts[index] = block[at] | block[at + 1] << 8
+
+    def act(self, pulses, pump, dump):
+        """Set the outputs of the next period."""
+        out = self._out
+        at = 2
+        for index in range(len(pulses)):
+            _put(out, at, pulses[index])
+            at += 2
+        _put(out, at, pump)
+        _put(out, at + 2, 1 if dump else 0)
+
+    def vent(self):
+        """Fill closed, vent open, pump off."""
+        out = self._out
+        at = 2
+        while at < self._link_out - 4:
+            _put(out, at, 0)
+            _put(out, at + 2, 65535)
+            at += 4
+        _put(out, at, 0)
+        _put(out, at + 2, 0)
+
+    def receive(self, buffer):
+        """Bytes that have come over the link."""
+        block = self._in
+        size = block[0] | block[1] << 8
+        for index in range(size):
+            buffer[index] = block[self._link_in + index]
+        return size
+
+    def send(self, frame, length):
+        """Queue a frame; False where it does not fit."""
+        if self._sent + length > LINK_OUT:
+            return False
+        out = self._out
+        at = self._link_out + self._sent
+        for index in range(length):
+            out[at + index] = frame[index]
+        self._sent += length
+        return True
+
+    def phase_us(self):
+        """Time stands still within a tick."""
+        return 0
+
+
+def _put(block, at, value):
+    block[at] = value & 255
+    block[at + 1] = value >> 8

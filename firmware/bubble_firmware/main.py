@@ -1,0 +1,12 @@
+"""Where the firmware starts: choose the board, then tick."""
+
+from bubble_firmware import boards
+from bubble_firmware.app import App, run
+
+
+def lockstep(name, boot_id):
+    """Run the firmware of board `name` against a plant at the other end of stdin and stdout."""
+    from bubble_firmware.boards.lockstep import Hands
+
+    board = boards.load(name)
+    run(App(board, Hands(board.BUBBLES, boot_id)))

@@ -1,0 +1,60 @@
+"""CRC-32 (IEEE 802.3, as in zlib) written straight into a buffer.
+
+MicroPython's `binascii.crc32` returns a long integer for three values in four, and a long integer is an
+allocation. The tick must not allocate, so the device runs this instead; the host passes a function of
+the same shape that calls crcmod. The tests hold crcmod, zlib, binascii and this against each other.
+"""
+
+from array import array
+
+from bubble_protocol.portable import micropython, ptr8, ptr32
+
+_POLYNOMIAL_LOW, _POLYNOMIAL_HIGH = 0x8320, 0xEDB8  # 0xEDB88320, bits reversed
+
+
+def _table():
+    """The 256 remainders, as signed words: viper has no unsigned ones."""
+    table = array("i", bytearray(4 * 256))
+    for byte in range(256):
+        low, high = byte, 0  # two halves keep every step within MicroPython's 31-bit small integers
+        for _ in range(8):
+            carry = low & 1
+            low = low >> 1 | (high & 1) << 15
+            high >>= 1
+            if carry:
+                low ^= _POLYNOMIAL_LOW
+                high ^= _POLYNOMIAL_HIGH
+        table[byte] = ((high ^ 0x8000) - 0x8000) * 65536 + low
+    return table
+
+
+_TABLE = _table()
+
+
+@micropython.viper
+def _crc32_into(table, buffer, start: int, end: int, out, at: int):
+    words = ptr32(table)
+    data = ptr8(buffer)
+    crc = -1
+    index = start
+    while index < end:
+        crc = (crc >> 8 & 0xFFFFFF) ^ words[(crc ^ data[index]) & 255]
+        index += 1
+    crc = ~crc
+    result = ptr8(out)
+    result[at] = crc & 255
+    result[at + 1] = crc >> 8 & 255
+    result[at + 2] = crc >> 16 & 255
+    result[at + 3] = crc >> 24 & 255
+
+
+def crc32_into(buffer, start, end, out, at):
+    """Write the CRC-32 of `buffer[start:end]` to `out[at:at + 4]`, low byte first. Allocates nothing."""
+    _crc32_into(_TABLE, buffer, start, end, out, at)
+
+
+def crc32_word(buffer, start, end):
+    """The same CRC as one signed word, the way `array('i')` holds it."""
+    crc = bytearray(4)
+    crc32_into(buffer, start, end, crc, 0)
+    return ((crc[3] ^ 128) - 128) * 16777216 + (crc[2] << 16 | crc[1] << 8 | crc[0])

@@ -1,0 +1,125 @@
+"""Frames on the wire: COBS around (id, sequence number, payload, CRC-32), one 0x00 after each.
+
+    | 1      | 1  | 2        | 0..247  | 4      | 1    |
+    | COBS   | id | sequence | payload | CRC-32 | 0x00 |
+
+Nine bytes around a payload. The content (id to CRC) is at most 254 bytes, so a COBS block is never split
+and both directions work in place and touch only the zeros (Cheshire and Baker, 1999).
+
+Nothing here allocates once made, reads a clock or does I/O. `crc32_into(buffer, start, end, out, at)` is
+the caller's: crcmod on the host, `bubble_protocol.crc` on the device.
+"""
+
+HEADER = 3  # id, sequence number
+CRC = 4
+CONTENT_MAX = 254
+PAYLOAD_MAX = CONTENT_MAX - HEADER - CRC
+FRAME_MAX = CONTENT_MAX + 2  # with the COBS byte and the delimiter
+OVERHEAD = FRAME_MAX - PAYLOAD_MAX
+
+_ZERO = b"\x00"
+_SHORTEST = 1 + HEADER + CRC  # without the delimiter
+
+
+def seal(frame, length, crc32_into):
+    """Finish the frame whose id, sequence number and payload stand at `frame[1:1 + length]`.
+
+    `frame` is a bytearray of FRAME_MAX bytes. Returns the length of the finished frame, delimiter included.
+    """
+    end = 1 + length + CRC
+    crc32_into(frame, 1, 1 + length, frame, 1 + length)
+    frame[end] = 0
+    at = 0
+    while at < end:
+        zero = frame.find(_ZERO, at + 1, end + 1)
+        frame[at] = zero - at
+        at = zero
+    return end + 1
+
+
+def put_header(frame, message_id, sequence):
+    """Write id and sequence number where `seal` expects them."""
+    frame[1] = message_id
+    frame[2] = sequence & 255
+    frame[3] = sequence >> 8 & 255
+
+
+class Decoder:
+    """Finds frames in a byte stream; survives any bytes.
+
+    Call `feed` until it has taken all bytes. After each call `length` says whether a frame has just been
+    completed: then its id stands in `message_id`, its sequence number in `sequence`, and `length` counts
+    the bytes of id, sequence number and payload; the payload is `frame[PAYLOAD_AT:1 + length]`, valid until
+    the next `feed`. Otherwise `length` is 0. `good` and `bad` count frames.
+    """
+
+    PAYLOAD_AT = 1 + HEADER
+
+    def __init__(self, crc32_into):
+        self.frame = bytearray(FRAME_MAX)
+        self.length = 0
+        self.good = 0
+        self.bad = 0
+        self._used = 0  # bytes of the frame so far; more than fit means too long
+        self._crc = bytearray(CRC)
+        self._crc32_into = crc32_into
+
+    @property
+    def message_id(self):
+        """The id of the frame just completed."""
+        return self.frame[1]
+
+    @property
+    def sequence(self):
+        """The sequence number of the frame just completed."""
+        return self.frame[2] | self.frame[3] << 8
+
+    def reset(self):
+        """Forget a frame begun, as after a reconnect."""
+        self.length = self._used = 0
+
+    def feed(self, data, start, end):
+        """Take bytes of `data[start:end]` (bytes or bytearray) up to the end of one frame; returns the index after them."""
+        self.length = 0
+        stop = data.find(_ZERO, start, end)
+        last = end if stop < 0 else stop
+        used = self._used
+        if used + last - start > FRAME_MAX - 1:
+            used = FRAME_MAX
+        else:
+            frame = self.frame
+            for index in range(start, last):
+                frame[used] = data[index]
+                used += 1
+        if stop < 0:
+            self._used = used
+            return end
+        self._used = 0
+        if used:  # a delimiter alone is a way to say: start afresh
+            if self._is_good(used):
+                self.good += 1
+                self.length = used - 1 - CRC
+            else:
+                self.bad += 1
+        return stop + 1
+
+    def _is_good(self, used):
+        if used < _SHORTEST or used >= FRAME_MAX:
+            return False
+        frame = self.frame
+        at = 0
+        while at < used:  # walk from zero to zero and put them back
+            step = frame[at]
+            frame[at] = 0
+            at += step
+        if at != used:
+            return False
+        crc = self._crc
+        crc_at = used - CRC
+        self._crc32_into(frame, 1, crc_at, crc, 0)
+        return (
+            frame[crc_at] == crc[0]
+            and frame[crc_at + 1] == crc[1]
+            and frame[crc_at + 2] == crc[2]
+            and frame[crc_at + 3] == crc[3]
+        )

@@ -1,0 +1,232 @@
+"""Every message of the protocol, as plain data: the one source of codec, limits, documentation and golden vectors.
+
+A field is (name, kind, unit, low, high, meaning). Limits of None: every value of the kind is allowed. A
+message has fixed fields and may end in a group of fields repeated to the end of the payload. Replies have
+the request's id plus REPLY. All numbers are little-endian. Fields are only ever appended.
+"""
+
+# Kinds: the low bits are the size in bytes, the top bit says signed. TEXT is 16 bytes of ASCII, zero padded.
+U8, U16, U32, I32 = 0x01, 0x02, 0x04, 0x84
+TEXT = 0x10
+KIND_NAMES = {U8: "u8", U16: "u16", U32: "u32", I32: "i32", TEXT: "text16"}
+
+REPLY = 0x80
+
+HELLO, PING, INFO, SHOW, STATE, SUBSCRIBE, TELEMETRY = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
+TABLE_WRITE, TABLE_COMMIT, TABLE_READ, STOP, VENT, CLEAR = 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D
+ERROR = 0x7F
+
+# What ERROR says went wrong.
+UNKNOWN_MESSAGE, WRONG_LENGTH, OUT_OF_RANGE, WRONG_COUNT, BAD_TABLE, BAD_CRC, NO_COMMON_PROTOCOL, FAULTED = range(1, 9)
+ERRORS = (
+    (UNKNOWN_MESSAGE, "unknown_message", "no message has this id"),
+    (WRONG_LENGTH, "wrong_length", "the payload is too short or too long: asked bytes, low to high allowed"),
+    (OUT_OF_RANGE, "out_of_range", "a field is outside its limits: field, element, asked, low, high"),
+    (WRONG_COUNT, "wrong_count", "not one entry per bubble: asked entries, low = high = bubbles"),
+    (BAD_TABLE, "bad_table", "a table is incomplete or its heights do not rise: element is the bubble, asked the knot"),
+    (BAD_CRC, "bad_crc", "the tables received are not the tables sent"),
+    (NO_COMMON_PROTOCOL, "no_common_protocol", "asked is the host's newest, low to high the device's"),
+    (FAULTED, "faulted", "the device failed at this request and vents"),
+)
+
+# What the board as a whole is doing.
+VENTED, ACTIVE, HOLDING = range(3)
+MODES = (
+    (VENTED, "vented", "every bubble's vent valve is open"),
+    (ACTIVE, "active", "heights are controlled"),
+    (HOLDING, "holding", "all valves are closed and stay closed"),
+)
+
+# What one bubble is doing.
+RESTING, MOVING, SETTLED, STOPPED, FAULT = range(5)
+STATUSES = (
+    (RESTING, "resting", "vent open, no pressure wanted"),
+    (MOVING, "moving", "on its way to its target"),
+    (SETTLED, "settled", "at its target"),
+    (STOPPED, "stopped", "valves closed, not controlled"),
+    (FAULT, "fault", "isolated and vented; see its faults"),
+)
+
+# Faults of one bubble, as bits.
+OVERPRESSURE, SENSOR_LOST, VALVE_TIME = 1, 2, 4
+FAULTS = (
+    (OVERPRESSURE, "overpressure", "pressure above the board's limit"),
+    (SENSOR_LOST, "sensor_lost", "the sensor reads the end of its range: broken wire or missing chip"),
+    (VALVE_TIME, "valve_time", "the fill valve was open longer than the board allows at a time"),
+)
+
+_TICKS = ("ticks", U32, "ticks", None, None, "device time: ticks since boot")
+_BUBBLES = (
+    ("height_um", U16, "µm", None, None, "estimated height"),
+    ("pressure_pa", I32, "Pa", None, None, "gauge pressure at the sensor"),
+    ("target_um", U16, "µm", None, None, "height asked"),
+    ("status", U8, "", None, None, "see bubble status"),
+    ("faults", U8, "", None, None, "see faults, bits"),
+)
+_KNOTS = (
+    ("knot_um", U16, "µm", 1, None, "height of a knot"),
+    ("knot_pa", U16, "Pa", None, None, "gauge pressure that holds it"),
+)
+
+# (id, name, fixed fields, repeated fields, meaning)
+MESSAGES = (
+    (
+        HELLO,
+        "HELLO",
+        (
+            ("protocol_min", U8, "", None, None, "oldest protocol the host speaks"),
+            ("protocol_max", U8, "", None, None, "newest protocol the host speaks"),
+        ),
+        (),
+        "who is there?",
+    ),
+    (
+        HELLO | REPLY,
+        "HELLO_REPLY",
+        (
+            ("protocol_min", U8, "", None, None, "oldest protocol the device speaks"),
+            ("protocol_max", U8, "", None, None, "newest protocol the device speaks"),
+            ("schema_crc", U32, "", None, None, "CRC-32 of this schema as the device knows it"),
+            ("boot_id", U32, "", None, None, "another number after every boot"),
+            ("firmware_major", U8, "", None, None, "firmware version"),
+            ("firmware_minor", U8, "", None, None, ""),
+            ("firmware_patch", U8, "", None, None, ""),
+            ("board", TEXT, "", None, None, "name of the board"),
+            ("bubbles", U8, "", None, None, "how many bubbles it has"),
+            ("tick_us", U16, "µs", None, None, "length of a tick"),
+            ("height_rest_um", U16, "µm", None, None, "height of a bubble without pressure"),
+            ("height_max_um", U16, "µm", None, None, "the greatest height that may be asked"),
+            ("pressure_max_pa", U32, "Pa", None, None, "gauge pressure at which a bubble is vented"),
+            ("window", U8, "requests", None, None, "requests that may be under way at once"),
+            ("capabilities", U32, "", None, None, "bits, none defined yet"),
+            ("tables_crc", U32, "", None, None, "CRC-32 of the tables in use"),
+        ),
+        (),
+        "the device introduces itself",
+    ),
+    (PING, "PING", (("token", U32, "", None, None, "comes back unchanged"),), (), "are you there, what time is it?"),
+    (
+        PING | REPLY,
+        "PING_REPLY",
+        (
+            ("token", U32, "", None, None, "the request's"),
+            _TICKS,
+            ("phase_us", U16, "µs", None, None, "time since the tick began"),
+        ),
+        (),
+        "here, at this device time",
+    ),
+    (INFO, "INFO", (), (), "how are you?"),
+    (
+        INFO | REPLY,
+        "INFO_REPLY",
+        (
+            _TICKS,
+            ("late_ticks", U32, "ticks", None, None, "ticks that began late"),
+            ("tick_worst_us", U32, "µs", None, None, "the longest tick"),
+            ("exceptions", U32, "", None, None, "exceptions that vented the board"),
+            ("frames_good", U32, "frames", None, None, "frames understood"),
+            ("frames_bad", U32, "frames", None, None, "frames dropped: CRC, COBS or length"),
+            ("telemetry_dropped", U32, "frames", None, None, "telemetry that found no room"),
+            ("heap_free", U32, "bytes", None, None, "free heap; 0 where it has no limit"),
+            ("supply_pa", I32, "Pa", None, None, "gauge pressure of the reservoir"),
+            ("tables_crc", U32, "", None, None, "CRC-32 of the tables in use"),
+            ("mode", U8, "", None, None, "see mode"),
+        ),
+        (),
+        "counters and health",
+    ),
+    (
+        SHOW,
+        "SHOW",
+        (("over_ms", U16, "ms", 0, 60000, "time to take for the change; 0: as fast as the valves can"),),
+        (("height_um", U16, "µm", 0, None, "height asked, up to height_max_um; at rest height or below: no pressure"),),
+        "take this shape; one height per bubble",
+    ),
+    (SHOW | REPLY, "SHOW_REPLY", (_TICKS,), (), "targets set"),
+    (STATE, "STATE", (), (), "what shape are you in?"),
+    (
+        STATE | REPLY,
+        "STATE_REPLY",
+        (_TICKS, ("mode", U8, "", None, None, "see mode")),
+        _BUBBLES,
+        "the state of every bubble",
+    ),
+    (
+        SUBSCRIBE,
+        "SUBSCRIBE",
+        (("period_ticks", U16, "ticks", 0, 60000, "one TELEMETRY every so many ticks; 0: none"),),
+        (),
+        "send telemetry",
+    ),
+    (SUBSCRIBE | REPLY, "SUBSCRIBE_REPLY", (_TICKS,), (), "subscription changed"),
+    (
+        TELEMETRY,
+        "TELEMETRY",
+        (_TICKS, ("mode", U8, "", None, None, "see mode")),
+        _BUBBLES,
+        "unasked: as STATE_REPLY; the sequence number counts what was due, so a gap is a loss",
+    ),
+    (
+        TABLE_WRITE,
+        "TABLE_WRITE",
+        (
+            ("bubble", U8, "", 0, None, "whose table"),
+            ("first", U8, "", 0, 63, "index of the first knot in this message"),
+            ("total", U8, "knots", 2, 64, "knots of the whole table"),
+        ),
+        _KNOTS,
+        "part of a height to pressure table; takes effect at TABLE_COMMIT",
+    ),
+    (TABLE_WRITE | REPLY, "TABLE_WRITE_REPLY", (_TICKS,), (), "part received"),
+    (
+        TABLE_COMMIT,
+        "TABLE_COMMIT",
+        (("crc", U32, "", None, None, "CRC-32 over all tables: per bubble the knots as (u16 µm, u16 Pa)"),),
+        (),
+        "check the tables received and use them from the next tick",
+    ),
+    (TABLE_COMMIT | REPLY, "TABLE_COMMIT_REPLY", (("tables_crc", U32, "", None, None, "of the tables in use"),), (), "tables in use"),
+    (
+        TABLE_READ,
+        "TABLE_READ",
+        (
+            ("bubble", U8, "", 0, None, "whose table"),
+            ("first", U8, "", 0, 63, "index of the first knot wanted"),
+        ),
+        (),
+        "what table is in use?",
+    ),
+    (
+        TABLE_READ | REPLY,
+        "TABLE_READ_REPLY",
+        (
+            ("bubble", U8, "", None, None, "whose table"),
+            ("first", U8, "", None, None, "index of the first knot in this message"),
+            ("total", U8, "knots", None, None, "knots of the whole table"),
+        ),
+        _KNOTS,
+        "part of the table in use",
+    ),
+    (STOP, "STOP", (), (), "close all valves and keep the air; SHOW goes on from there"),
+    (STOP | REPLY, "STOP_REPLY", (_TICKS,), (), "stopped"),
+    (VENT, "VENT", (), (), "open all vent valves until the next SHOW"),
+    (VENT | REPLY, "VENT_REPLY", (_TICKS,), (), "venting"),
+    (CLEAR, "CLEAR", (), (), "forget all faults; bubbles that still have one fault again"),
+    (CLEAR | REPLY, "CLEAR_REPLY", (_TICKS,), (), "faults cleared"),
+    (
+        ERROR,
+        "ERROR",
+        (
+            ("request", U8, "", None, None, "id of the message refused"),
+            ("error", U8, "", None, None, "see errors"),
+            ("field", U8, "", None, None, "index of the field: fixed fields first, then the repeated ones"),
+            ("element", U8, "", None, None, "which repetition, where it is one: the bubble or knot"),
+            ("asked", I32, "", None, None, "what was asked"),
+            ("low", I32, "", None, None, "the least allowed"),
+            ("high", I32, "", None, None, "the most allowed"),
+        ),
+        (),
+        "refused, nothing was changed; in place of the reply",
+    ),
+)
