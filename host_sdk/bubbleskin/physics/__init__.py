@@ -1,6 +1,38 @@
 """The membrane: the model of one bubble, its fit to measurements and the tables that the firmware runs on."""
 
 from bubbleskin.physics.balloon import Jump, LimitPoint, YeohBalloon, yeoh_pressure
+from bubbleskin.physics.calibration import Calibration, compare_tables, table_difference
+from bubbleskin.physics.data import BadRowWarning, Measurements, read_csv, write_csv
+from bubbleskin.physics.fit import IdentifiabilityWarning, LackOfFitWarning, Parameters, YeohFit, fit_yeoh
+from bubbleskin.physics.presets import PRESETS, Preset, preset
+from bubbleskin.physics.sheet import SheetFit, fit_sheet
+from bubbleskin.physics.synthetic import simulate_sheet
 from bubbleskin.physics.table import Table, TableError, build_table
 
-__all__ = ["Jump", "LimitPoint", "Table", "TableError", "YeohBalloon", "build_table", "yeoh_pressure"]
+__all__ = [
+    "PRESETS",
+    "BadRowWarning",
+    "Calibration",
+    "IdentifiabilityWarning",
+    "Jump",
+    "LackOfFitWarning",
+    "LimitPoint",
+    "Measurements",
+    "Parameters",
+    "Preset",
+    "SheetFit",
+    "Table",
+    "TableError",
+    "YeohBalloon",
+    "YeohFit",
+    "build_table",
+    "compare_tables",
+    "fit_sheet",
+    "fit_yeoh",
+    "preset",
+    "read_csv",
+    "simulate_sheet",
+    "table_difference",
+    "write_csv",
+    "yeoh_pressure",
+]

@@ -114,15 +114,18 @@ def read_csv(path: str | Path, *, skip_bad_rows: bool = False) -> Measurements:
     values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     bubble = values.get("bubble", np.zeros(len(rows))).astype(int)
     step = values["step"].astype(int) if "step" in values else None
-    return Measurements(
-        values["height"], values["pressure"], bubble, step, values.get("height_sd"), values.get("pressure_sd"),
-        path.name,
-    )  # fmt: skip
+    sds = values.get("height_sd"), values.get("pressure_sd")
+    return Measurements(values["height"], values["pressure"], bubble, step, *sds, source=path.name)
 
 
 def write_csv(path: str | Path, measurements: Measurements, *, comments: Iterable[str] = ()) -> None:
     """Write ``measurements`` in mm and kPa so that :func:`read_csv` reads them again, to 1 µm and 1 Pa."""
-    heading = ["bubble", *(["step"] if measurements.step is not None else []), "height [mm]", "pressure [kPa]"]
+    heading = [
+        "bubble",
+        *(["step"] if measurements.step is not None else []),
+        "height [mm]",
+        "pressure [kPa]",
+    ]
     lines = [f"# {comment}" for comment in comments] + [",".join(heading)]
     for k in range(len(measurements)):
         cells = [str(int(measurements.bubble[k]))]
@@ -138,7 +141,9 @@ def _heading(path: Path, cells: list[str]) -> list[tuple[str, float] | None]:
     columns: list[tuple[str, float] | None] = []
     for cell in (cell.strip().strip('"') for cell in cells):
         match = _HEADING.match(cell.replace(" sd", "_sd"))
-        name, unit = (match["name"].lower(), match["unit"] or match["tail"]) if match else (cell.lower(), None)
+        name, unit = (
+            (match["name"].lower(), match["unit"] or match["tail"]) if match else (cell.lower(), None)
+        )
         if unit == "sd":
             name, unit = f"{name}_sd", None
         if name in NUMBERED:
@@ -147,7 +152,9 @@ def _heading(path: Path, cells: list[str]) -> list[tuple[str, float] | None]:
             known = UNITS[name.removesuffix("_sd")]
             example = f"'{name} [{'mm' if name.startswith('height') else 'kPa'}]'"
             if unit is None:
-                raise InvalidInput(f"{path}: the column {cell!r} has no unit; write it in the header, as {example}.")
+                raise InvalidInput(
+                    f"{path}: the column {cell!r} has no unit; write it in the header, as {example}."
+                )
             if unit.lower() not in known or unit == "mPa":
                 raise InvalidInput(
                     f"{path}: {unit!r} in the column {cell!r} is no unit of {name.removesuffix('_sd')} known "

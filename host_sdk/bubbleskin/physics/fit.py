@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -188,11 +188,12 @@ def fit_yeoh(
             warnings.warn(note, LackOfFitWarning, stacklevel=2)
     covariance = variance * inverse(linear.design.T @ (linear.design * (solution.weights > 0)[:, None]))
     fit = finish(shape, points, solution.theta, covariance, distances, solution, dof, repeats, tuple(notes))
-    doubt = _doubt(fit, points, linear.design)
-    if not doubt:
-        return fit
-    warnings.warn(doubt, IdentifiabilityWarning, stacklevel=2)
-    return YeohFit(**{**vars(fit), "notes": (*fit.notes, doubt)})
+    condition = float(np.linalg.cond(linear.design / np.linalg.norm(linear.design, axis=0)))
+    doubt = open_constants(fit, points, condition)
+    if doubt:
+        warnings.warn(doubt, IdentifiabilityWarning, stacklevel=2)
+        fit = replace(fit, notes=(*fit.notes, doubt))
+    return fit
 
 
 def as_points(height: Any, pressure: Any, height_sd: Any, pressure_sd: Any) -> Points:
@@ -282,9 +283,11 @@ def _repeats(
     return Repeats(float(spread[0]), float(spread[1]), int(count.size), p_value), between
 
 
-def _doubt(fit: YeohFit, points: Points, design: np.ndarray) -> str:
-    """A sentence if the data leaves the curve open, else nothing."""
-    condition = float(np.linalg.cond(design / np.linalg.norm(design, axis=0)))
+def open_constants(fit: YeohFit, points: Points, condition: float = 0.0) -> str:
+    """A sentence if the data leaves the curve open, else nothing.
+
+    ``condition`` is that of the design matrix with columns of unit length.
+    """
     checked = np.linspace(1.2, 2.8, 33) * fit.balloon.rest_height
     low, high = fit.pressure_band(checked)
     width = (high - low) / 2 / fit.balloon.pressure_at_height(checked)
@@ -293,17 +296,18 @@ def _doubt(fit: YeohFit, points: Points, design: np.ndarray) -> str:
     worst = checked[np.argmax(width)] * 1e3
     half = (fit.interval()[:, 1] - fit.interval()[:, 0]) / 2
     rest = fit.balloon.rest_height * 1e3
+    lowest, highest = points.height.min() * 1e3, points.height.max() * 1e3
     missing = []
-    if points.height.min() * 1e3 > 1.3 * rest:
+    if lowest > 1.3 * rest:
         missing.append(f"below {1.3 * rest:.1f} mm")
-    if points.height.max() * 1e3 < 2.1 * rest:
+    if highest < 2.1 * rest:
         missing.append(f"above {2.1 * rest:.1f} mm")
-    advice = f"Measure {' and '.join(missing)} as well, off the plateau." if missing else "Measure more points."
-    names = ", ".join(
-        f"{name} by {h:.3g} Pa" for name, h in zip(("mu", "C2", "C3"), half, strict=True)
+    advice = (
+        f"Measure {' and '.join(missing)} as well, off the plateau." if missing else "Measure more points."
     )
+    names = ", ".join(f"{name} by {h:.3g} Pa" for name, h in zip(("mu", "C2", "C3"), half, strict=True))
     return (
-        f"the heights measured ({points.height.min() * 1e3:.1f} to {points.height.max() * 1e3:.1f} mm) do not "
+        f"the heights measured ({lowest:.1f} to {highest:.1f} mm) do not "
         f"determine all three constants: they are open {names}, and the pressure at {worst:.0f} mm by "
         f"{100 * width.max():.0f} %. {advice}"
     )

@@ -73,12 +73,9 @@ class Points:
     def __len__(self) -> int:
         return self.height.size
 
-
-class Prior(NamedTuple):
-    """A Gaussian belief about θ from the other bubbles of a sheet."""
-
-    mean: np.ndarray
-    precision: np.ndarray
+    def of(self, mask: np.ndarray) -> Points:
+        """Those points that ``mask`` marks."""
+        return Points(self.height[mask], self.pressure[mask], self.height_sd[mask], self.pressure_sd[mask])
 
 
 class Linear(NamedTuple):
@@ -89,7 +86,7 @@ class Linear(NamedTuple):
 
     def residuals(self, theta: np.ndarray) -> np.ndarray:
         """Signed distances from the curve in units of the noise."""
-        return self.target - self.design @ theta
+        return self.target - (self.design * theta).sum(axis=1)
 
 
 class Solution(NamedTuple):
@@ -118,12 +115,17 @@ def start(shape: Shape, points: Points) -> np.ndarray:
 
 
 def project(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) -> np.ndarray:
-    """The place on the curve of ``theta`` nearest to each point, from the guess ``eta``, in heights (m)."""
+    """The place on the curve nearest to each point, from the guess ``eta``, in heights (m).
+
+    ``theta`` is (3,) for points of one curve, (n, 3) if each point has its own.
+    """
     low = 0.97 * shape.rest_height
     for _ in range(3):
         basis, slopes = shape.basis(eta)
-        P, dP = basis @ theta, slopes @ theta
-        gradient = (eta - points.height) / points.height_sd**2 + (P - points.pressure) * dP / points.pressure_sd**2
+        P, dP = (basis * theta).sum(axis=1), (slopes * theta).sum(axis=1)
+        gradient = (eta - points.height) / points.height_sd**2 + (
+            P - points.pressure
+        ) * dP / points.pressure_sd**2
         curvature = 1 / points.height_sd**2 + (dP / points.pressure_sd) ** 2
         step = np.clip(gradient / curvature, -0.1 * shape.rest_height, 0.1 * shape.rest_height)
         eta = np.maximum(eta - step, low)
@@ -133,17 +135,15 @@ def project(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) ->
 def linearise(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) -> Linear:
     """The problem with each point carried along the tangent to its place ``eta`` on the curve."""
     basis, slopes = shape.basis(eta)
-    dP = slopes @ theta
+    dP = (slopes * theta).sum(axis=1)
     sd = np.sqrt(points.pressure_sd**2 + (dP * points.height_sd) ** 2)
     return Linear(basis / sd[:, None], (points.pressure + dP * (eta - points.height)) / sd)
 
 
-def solve_bounded(linear: Linear, weights: np.ndarray, prior: Prior | None = None) -> np.ndarray:
+def solve_bounded(linear: Linear, weights: np.ndarray) -> np.ndarray:
     """Least squares with C3 ≥ 0, and C2 ≥ 0 where C3 is 0: else the wall would lose its stiffness."""
     X = linear.design * np.sqrt(weights)[:, None]
     A, b = X.T @ X, X.T @ (linear.target * np.sqrt(weights))
-    if prior is not None:
-        A, b = A + prior.precision, b + prior.precision @ prior.mean
     theta = np.zeros(3)
     for free in (3, 2, 1):
         scale = 1 / np.sqrt(np.diag(A)[:free])
@@ -219,4 +219,4 @@ def noise_variance(residuals: np.ndarray, scale: float, *, robust: bool, fitted:
     psi = u * bisquare(u)
     inside = np.clip(1 - (u / BISQUARE) ** 2, 0, None)
     dpsi = inside * (1 - 5 * (u / BISQUARE) ** 2)
-    return float(scale**2 * (np.sum(psi**2) / spare) / max(np.mean(dpsi), 0.1) ** 2)
+    return float(scale**2 * (np.sum(psi**2) / spare) / max(float(np.mean(dpsi)), 0.1) ** 2)

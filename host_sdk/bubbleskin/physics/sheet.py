@@ -9,12 +9,11 @@ its own values; one with three points borrows the shape of the curve and keeps i
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.physics.balloon import Surface, Wall, YeohBalloon
@@ -27,21 +26,19 @@ from bubbleskin.physics.fit import (
     YeohFit,
     as_points,
     finish,
-    fit_yeoh,
-    inverse,
+    open_constants,
 )
 from bubbleskin.physics.regression import (
     Linear,
     Points,
-    Prior,
     Shape,
     Solution,
     bisquare,
+    huber,
     linearise,
-    median_scale,
     noise_variance,
     project,
-    solve_bounded,
+    start,
 )
 
 STIFFNESS_SPREAD = 0.10
@@ -51,7 +48,14 @@ SHAPE_SPREAD = 0.05
 """And each constant by itself. Both only as strong as :data:`SUPPOSED` measured bubbles."""
 
 SUPPOSED = 3.0
-PASSES = 40
+
+MEAN_SPREAD = 1.0
+"""The sheet's mean is first supposed to be the paper's material, scaled, within 100 % of each constant."""
+
+STATED = 6.0
+"""The stated noise counts as much as this many points do."""
+
+PASSES = 60
 
 
 @dataclass(frozen=True)
@@ -98,109 +102,135 @@ def fit_sheet(
     """Fit every bubble of a sheet, the prior being what the others say.
 
     ``bubble`` (n,) are the bubbles' numbers, one per point; the rest is as for :func:`fit_yeoh`. A bubble
-    may have as few as one point. Raises ``InvalidInput`` if all bubbles together have too few.
+    may have as few as one point. Warns :class:`IdentifiabilityWarning` with the numbers of bubbles whose
+    curve stays open between 6 and 14 mm. Raises ``InvalidInput`` if all together have too few points.
     """
     shape = Shape(radius, thickness, wall, surface)
     points = as_points(height, pressure, height_sd, pressure_sd)
     number = np.asarray(bubble)
     if number.shape != points.height.shape:
-        raise InvalidInput(f"bubble must number each of the {len(points)} points; it has {number.size} entries.")
+        raise InvalidInput(
+            f"bubble must number each of the {len(points)} points; it has {number.size} entries."
+        )
     if len(points) < LEAST_POINTS:
-        raise InvalidInput(f"{len(points)} points on the whole sheet are too few: give at least {LEAST_POINTS}.")
-    members = {int(n): _subset(points, number == n) for n in np.unique(number)}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # pooled bubbles differ, so its own doubts mean nothing here
-        pooled = fit_yeoh(
-            points.height, points.pressure, radius=radius, thickness=thickness, wall=wall, surface=surface,
-            height_sd=points.height_sd, pressure_sd=points.pressure_sd, robust=robust,
-        )  # fmt: skip
-    state = _Sheet(shape, members, np.array(pooled.parameters), robust=robust)
-    state.run()
-    return state.result()
+        raise InvalidInput(
+            f"{len(points)} points on the whole sheet are too few: give at least {LEAST_POINTS}."
+        )
+    shape.balloon(start(shape, points))  # refuses impossible sizes and pressures
+    numbers, index = np.unique(number, return_inverse=True)
+    sheet = _Sheet(shape, points, index, robust=robust)
+    sheet.run()
+    covariances = sheet.covariances()
+    fits = {}
+    for k, n in enumerate(numbers):
+        mine = index == k
+        theta = sheet.phi[k] * sheet.unit
+        linear = Linear(sheet.linear.design[mine] / sheet.unit, sheet.linear.target[mine])
+        solution = Solution(theta, linear, sheet.weights[mine], sheet.scale)
+        own = points.of(mine)
+        fit = finish(shape, own, theta, covariances[k], sheet.distances[mine], solution, sheet.dof)
+        doubt = open_constants(fit, own)
+        fits[int(n)] = replace(fit, notes=(doubt,)) if doubt else fit
+    doubtful = [n for n, fit in fits.items() if fit.notes]
+    if doubtful:
+        warnings.warn(
+            f"bubble{'s' * (len(doubtful) > 1)} {', '.join(map(str, doubtful))}: "
+            f"{fits[doubtful[0]].notes[0]}",
+            IdentifiabilityWarning,
+            stacklevel=2,
+        )
+    mean = Parameters(*(float(v) for v in sheet.mean * sheet.unit))
+    return SheetFit(fits, mean, sheet.spread * np.outer(sheet.unit, sheet.unit), sheet.scale)
 
 
 class _Sheet:
-    """The iteration: every bubble given the sheet, the sheet given every bubble."""
+    """The iteration: every bubble given the sheet, then the sheet given every bubble.
 
-    def __init__(
-        self, shape: Shape, members: dict[int, Points], pooled: np.ndarray, *, robust: bool
-    ) -> None:
-        self.shape, self.members, self.robust = shape, members, robust
-        unit = np.maximum(pooled, [0.0, 0.1 * pooled[0] / 100, pooled[0] / 5000])
-        self.supposed = STIFFNESS_SPREAD**2 * np.outer(unit, unit) + SHAPE_SPREAD**2 * np.diag(unit**2)
-        self.mean, self.spread = pooled, 4 * self.supposed
-        self.theta = {n: pooled for n in members}
-        self.eta = {n: points.height for n, points in members.items()}
-        self.weights = {n: np.ones(len(points)) for n, points in members.items()}
-        self.linear: dict[int, Linear] = {}
-        self.covariance: dict[int, np.ndarray] = {}
-        self.scale, self.variance = 1.0, 1.0
+    All points lie in one array, ``index`` (n,) saying to which of the bubbles each belongs; constants are
+    in units of ``unit``, so that the 3 × 3 matrices, one per bubble, are well scaled.
+    """
+
+    def __init__(self, shape: Shape, points: Points, index: np.ndarray, *, robust: bool) -> None:
+        self.shape, self.points, self.index, self.robust = shape, points, index, robust
+        self.count = int(index.max()) + 1
+        self.of = (index == np.arange(self.count)[:, None]).astype(float)
+        self.unit = start(shape, points)
+        self.eta = points.height
+        self.supposed = np.full((3, 3), STIFFNESS_SPREAD**2) + SHAPE_SPREAD**2 * np.eye(3)
+        self.mean, self.spread = np.ones(3), 4 * self.supposed
+        self.phi = np.ones((self.count, 3))
+        self.fitted, self.scale = 3.0, 1.0
+        self.weights = np.ones(len(points))
 
     def run(self) -> None:
         for k in range(PASSES):
-            before = np.concatenate(list(self.theta.values()))
+            before = self.phi
             self._see()
-            self._weigh(hold=k > PASSES // 2)
+            self._weigh(huber if k < 5 else bisquare)
             self._each_bubble()
             self._whole_sheet()
-            after = np.concatenate(list(self.theta.values()))
-            if k > 3 and np.max(np.abs(after - before) / np.tile(self.theta_unit, len(self.theta))) < 1e-5:
+            if k > 8 and np.max(np.abs(self.phi - before)) < 1e-5:
                 break
-
-    @property
-    def theta_unit(self) -> np.ndarray:
-        return np.sqrt(np.diag(self.supposed))
+        self._see()
 
     def _see(self) -> None:
-        for n, points in self.members.items():
-            self.eta[n] = project(self.shape, points, self.theta[n], self.eta[n])
-            self.linear[n] = linearise(self.shape, points, self.theta[n], self.eta[n])
+        theta = (self.phi * self.unit)[self.index]
+        self.eta = project(self.shape, self.points, theta, self.eta)
+        linear = linearise(self.shape, self.points, theta, self.eta)
+        self.linear = Linear(linear.design * self.unit, linear.target)
+        self.distances = self.linear.residuals(self.phi[self.index])
 
-    def _weigh(self, *, hold: bool) -> None:
-        # One noise for the sheet: a bubble with few points could not tell its own.
-        residuals = {n: self.linear[n].residuals(self.theta[n]) for n in self.members}
-        every = np.concatenate(list(residuals.values()))
-        fitted = min(3.0 * len(self.members), every.size / 2)
+    def _weigh(self, weigh: Callable[[np.ndarray], np.ndarray]) -> None:
+        # One noise for the sheet, since a bubble with few points could not tell its own; and the stated
+        # noise counts as STATED points, since a sheet with few points could not either.
+        spare = max(self.distances.size - self.fitted, 1.0)
+        self.dof = STATED + spare
         if self.robust:
-            if not hold:
-                self.scale = median_scale(every, int(fitted))
-            self.weights = {n: bisquare(r / self.scale) for n, r in residuals.items()}
+            found = (1.4826 * float(np.median(np.abs(self.distances)))) ** 2 * self.distances.size
+            self.scale = float(np.sqrt((STATED + found) / self.dof))
+            self.weights = weigh(self.distances / self.scale)
         else:
-            self.scale = float(np.sqrt(np.sum(every**2) / max(every.size - fitted, 1)))
-        self.variance = noise_variance(every, self.scale, robust=self.robust, fitted=fitted)
-        self.dof = max(every.size - fitted, 1.0)
+            self.scale = float(np.sqrt((STATED + np.sum(self.distances**2)) / self.dof))
+        found = noise_variance(self.distances, self.scale, robust=self.robust, fitted=self.fitted)
+        self.variance = (STATED + spare * found) / self.dof
 
     def _each_bubble(self) -> None:
-        prior = Prior(self.mean, inverse(self.spread))
-        for n in self.members:
-            X, y = self.linear[n]
-            noise = np.sqrt(self.variance)
-            self.theta[n] = solve_bounded(Linear(X / noise, y / noise), self.weights[n], prior)
-            kept = X * (self.weights[n] > 0)[:, None] / noise
-            self.covariance[n] = inverse(kept.T @ kept + prior.precision)
+        X, y = self.linear
+        prior = np.linalg.inv(self.spread)
+        A = np.einsum("bn,ni,nj->bij", self.of * self.weights, X, X) / self.variance
+        b = np.einsum("bn,ni,n->bi", self.of * self.weights, X, y) / self.variance
+        self.phi = np.linalg.solve(A + prior, (b + prior @ self.mean)[:, :, None])[:, :, 0]
+        for k in np.flatnonzero(self.phi[:, 2] < 0):
+            self.phi[k] = _without_c3(A[k] + prior, b[k] + prior @ self.mean)
+        self.information = np.einsum("bn,ni,nj->bij", self.of * (self.weights > 0), X, X) / self.variance
+        self.covariance = np.linalg.inv(self.information + prior)
+        self.fitted = float(np.einsum("bij,bji->", self.covariance, self.information)) + 1e-9
 
     def _whole_sheet(self) -> None:
-        thetas = np.array(list(self.theta.values()))
-        self.mean = thetas.mean(axis=0)
-        off = thetas - self.mean
-        scatter = off.T @ off + sum(self.covariance.values())
-        self.spread = (scatter + SUPPOSED * self.supposed) / (len(thetas) + SUPPOSED)
+        weak = np.eye(3) / MEAN_SPREAD**2
+        prior = np.linalg.inv(self.spread)
+        self.mean = np.linalg.solve(
+            self.count * prior + weak, prior @ self.phi.sum(axis=0) + weak @ np.ones(3)
+        )
+        off = self.phi - self.mean
+        scatter = off.T @ off + self.covariance.sum(axis=0)
+        self.spread = (scatter + SUPPOSED * self.supposed) / (self.count + SUPPOSED)
 
-    def result(self) -> SheetFit:
-        self._see()
-        count = len(self.members)
-        prior = inverse(self.spread)
-        fits = {}
-        for n, points in self.members.items():
-            # The sheet's mean is itself uncertain; what a bubble takes from it, it inherits.
-            taken = self.covariance[n] @ prior
-            covariance = self.covariance[n] + taken @ (self.spread / count) @ taken.T
-            distances = self.linear[n].residuals(self.theta[n])
-            solution = Solution(self.theta[n], self.linear[n], self.weights[n], self.scale)
-            fits[n] = finish(self.shape, points, self.theta[n], covariance, distances, solution, self.dof)
-        mean = Parameters(*(float(v) for v in self.mean))
-        return SheetFit(fits, mean, self.spread, self.scale)
+    def covariances(self) -> np.ndarray:
+        """Covariance of each bubble's constants (B, 3, 3), Pa²."""
+        # The sheet's mean is itself uncertain, and what a bubble takes from it, it inherits.
+        prior = np.linalg.inv(self.spread)
+        seen = prior - prior @ self.covariance @ prior  # what each bubble says about the mean
+        of_mean = np.linalg.inv(seen.sum(axis=0) + np.eye(3) / MEAN_SPREAD**2)
+        taken = self.covariance @ prior
+        whole = self.covariance + taken @ of_mean @ taken.transpose(0, 2, 1)
+        return whole * np.outer(self.unit, self.unit)
 
 
-def _subset(points: Points, mask: np.ndarray) -> Points:
-    return Points(points.height[mask], points.pressure[mask], points.height_sd[mask], points.pressure_sd[mask])
+def _without_c3(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The minimum with C3 held at 0, and C2 too where it would be negative."""
+    phi = np.zeros(3)
+    phi[:2] = np.linalg.solve(A[:2, :2], b[:2])
+    if phi[1] < 0:
+        phi[:2] = b[0] / A[0, 0], 0.0
+    return phi

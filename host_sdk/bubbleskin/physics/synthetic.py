@@ -32,9 +32,7 @@ def simulate_sheet(
     rng = np.random.default_rng(seed)
     nominal = balloon or YeohBalloon()
     factors = 1 + np.clip(rng.normal(0, spread / 2, (bubbles, 2)), -spread, spread)
-    true = [
-        replace(nominal, mu=nominal.mu * m, thickness=nominal.thickness * w) for m, w in factors
-    ]
+    true = [replace(nominal, mu=nominal.mu * m, thickness=nominal.thickness * w) for m, w in factors]
     exact = np.linspace(*heights_mm, settings) * 1e-3
     rows = []
     for number, one in enumerate(true):

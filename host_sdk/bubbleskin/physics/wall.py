@@ -12,6 +12,8 @@ import math
 
 import numpy as np
 
+Constant = float | np.ndarray  # an array of constants broadcasts against the stretches
+
 OFFSETS = {"inner": (0.0, 1.0), "mid": (-0.5, 0.5), "outer": (-1.0, 0.0)}
 """Inner and outer rest surface as seen from the named one, in wall thicknesses."""
 
@@ -58,20 +60,20 @@ def radius_slope(
     return s2 / a**2, s2 / b**2
 
 
-def energy_density(x: np.ndarray, mu: float, c2: float, c3: float) -> np.ndarray:
+def energy_density(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
     """W (J/m³) in equal biaxial stretch. Paper, Eq. 3."""
     J = 2 * x * x + x**-4 - 3
     return ((c3 * J + c2) * J + mu / 2) * J
 
 
-def energy_slope(x: np.ndarray, mu: float, c2: float, c3: float) -> np.ndarray:
+def energy_slope(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
     """DW/dI (Pa) in equal biaxial stretch."""
     J = 2 * x * x + x**-4 - 3
     return (3 * c3 * J + 2 * c2) * J + mu / 2
 
 
 def energy(
-    x: np.ndarray, mu: float, c2: float, c3: float, h0: float, r0: float, wall: str, surface: str
+    x: np.ndarray, mu: Constant, c2: Constant, c3: Constant, h0: float, r0: float, wall: str, surface: str
 ) -> np.ndarray:
     """Strain energy U (J) of the whole wall.
 
@@ -89,7 +91,7 @@ def energy(
 
 
 def slope(
-    x: np.ndarray, mu: float, c2: float, c3: float, h0: float, r0: float, wall: str, surface: str
+    x: np.ndarray, mu: Constant, c2: Constant, c3: Constant, h0: float, r0: float, wall: str, surface: str
 ) -> np.ndarray:
     """dP/dλ (Pa), λ the stretch of the named surface."""
     if wall == "thin":
@@ -106,7 +108,7 @@ def slope(
 
 
 def thick_pressure(
-    x: np.ndarray, mu: float, c2: float, c3: float, h0: float, r0: float, wall: str, surface: str
+    x: np.ndarray, mu: Constant, c2: Constant, c3: Constant, h0: float, r0: float, wall: str, surface: str
 ) -> np.ndarray:
     """Exact pressure (Pa) of a thick incompressible wall: ∫ W'(λ)/(λ³ − 1) dλ from λb to λa.
 
@@ -117,11 +119,11 @@ def thick_pressure(
     return _antiderivative(a / A, mu, c2, c3) - _antiderivative(b / B, mu, c2, c3)
 
 
-def _integrand(x: np.ndarray, mu: float, c2: float, c3: float) -> np.ndarray:
+def _integrand(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
     return 4 * energy_slope(x, mu, c2, c3) * (x**-2 + x**-5)
 
 
-def _antiderivative(x: np.ndarray, mu: float, c2: float, c3: float) -> np.ndarray:
+def _antiderivative(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
     # ∫ (I−3)^k (λ⁻² + λ⁻⁵) dλ for k = 0, 1, 2, term by term; tests differentiate it with sympy.
     y = 1 / x
     y2, y3 = y * y, y * y * y
