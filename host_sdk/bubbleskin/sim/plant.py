@@ -1,0 +1,172 @@
+"""The simulated wristband without its electronics: bubbles, lines, valves, reservoir, pump and sensors.
+
+`Plant.advance` steps it by an explicit time; nothing here reads a clock, and the same calls give the same
+bits. Importing this module imports numba, and the first steps compile two functions: a few seconds, once.
+"""
+
+import math
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bubbleskin.errors import InvalidInput
+from bubbleskin.physics.balloon import ATMOSPHERE, yeoh_pressure
+from bubbleskin.sim import kernel
+from bubbleskin.sim.parameters import PlantParameters, Supply
+from bubbleskin.sim.pneumatics import sensor_counts
+
+__all__ = ["Plant", "PlantParameters", "Supply"]
+
+SUBSTEP = 50e-6
+"""Longest step of the integration, s: heights are then right to 1 µm.
+
+Stable up to twice the settling time of the node: 160 µs against the tube, 100 µs with both valves open,
+25 µs with both open and no restrictors (C = 0.03 dm³/(s·bar)), which needs a shorter step.
+"""
+
+PA_PER_COUNT = 17.0
+SUPPLY_PA_PER_COUNT = 25.0
+
+
+class Plant:
+    """`len(parameters.mu)` bubbles at rest, at atmospheric pressure, on a reservoir at `supply_pa` gauge.
+
+    By default the reservoir is that of a board which has been powered for a while. `seed` is that of the
+    sensors' noise. Attributes: `parameters`, and `time` in s since the start.
+    """
+
+    def __init__(
+        self, parameters: PlantParameters, seed: int = 0, supply_pa: float = 60e3, substep: float = SUBSTEP
+    ):
+        n = len(parameters.mu)
+        self.parameters = parameters
+        self.time = 0.0
+        self._substep = substep
+        self._constants = np.empty(n, kernel.CONSTANTS)
+        for name in kernel.CONSTANTS.names or ():
+            self._constants[name] = getattr(parameters, name)
+        self._state = np.zeros(n, kernel.STATE)
+        self._state["stretch"] = 1.0
+        self._state["pressure"] = self._state["node"] = ATMOSPHERE
+        self._supply = np.array([astuple(parameters.supply)], kernel.SUPPLY)
+        self._air = np.array([(ATMOSPHERE + supply_pa, 0.0, 0.0)], kernel.AIR)
+        self._fill_on, self._vent_on = np.zeros(n), np.zeros(n)
+        self._noise = np.zeros(n)
+        self._rng = np.random.default_rng(seed)
+
+    def advance(
+        self, dt: float, fill_on: ArrayLike, vent_on: ArrayLike, pump: float = 0.0, dump: bool = False
+    ) -> None:
+        """Let `dt` seconds pass.
+
+        `fill_on` and `vent_on` are (n,) seconds within [0, dt] for which each valve's coil is energised from
+        the start of this interval; dt is throughout, and goes on seamlessly if the next interval starts
+        energised. `pump` is a duty from 0 to 1; `dump` opens the reservoir to the air.
+        """
+        if not 0.0 <= dt < math.inf:
+            raise InvalidInput(f"dt is {dt!r}; the plant can only step forward by a finite number of seconds")
+        self._fill_on[:] = fill_on
+        self._vent_on[:] = vent_on
+        # A hair less than the quotient: 5 ms in steps of 50 µs are 100 steps, whatever the rounding says.
+        substeps = max(1, math.ceil(dt / self._substep - 1e-6))
+        if dt > 0.0:
+            kernel.advance(
+                self._state,
+                self._constants,
+                self._air,
+                self._supply,
+                self._fill_on,
+                self._vent_on,
+                float(dt),
+                substeps,
+                float(pump),
+                bool(dump),
+            )
+        self.time += dt
+
+    def sense(self) -> NDArray[np.uint16]:
+        """Read the bubbles' sensors, at the valve nodes: (n,) counts of 17 Pa, 160 at zero gauge."""
+        counts = np.empty(len(self._state), np.uint16)
+        self._rng.standard_normal(out=self._noise)
+        kernel.sense(self._state, self._constants, self._noise, PA_PER_COUNT, counts)
+        return counts
+
+    def sense_supply(self) -> int:
+        """Read the reservoir's sensor: counts of 25 Pa, 160 at zero gauge."""
+        supply = self.parameters.supply
+        noise = supply.sensor_noise * self._rng.standard_normal()
+        return sensor_counts(self.supply_pa + supply.sensor_offset, noise, SUPPLY_PA_PER_COUNT)
+
+    def inject(self, name: str, bubble: int, value: float) -> None:
+        """Give `bubble` a fault; 0 takes it away again.
+
+        `leak`: RTṁ per Pa gauge, m³/s; 5e-8 takes 1 % of a full bubble's air a second.
+        `pop_off`: share of the line's bore that is open, 1 for a bubble that has slipped off its barb.
+        `fill_stuck`, `vent_stuck`: 1 stuck open, -1 stuck closed.
+        `sensor_stuck`: the count that it sticks at. `sensor_bias`: Pa added to what it sees.
+        `sensor_absent`: 1 for a converter input that reads its pull-down, 0 counts.
+        """
+        if name not in kernel.FAULTS:
+            raise InvalidInput(f"no fault is called {name!r}; choose one of {', '.join(kernel.FAULTS)}")
+        self._state[name][bubble] = value
+
+    def rest_at(self, height_mm: ArrayLike) -> None:
+        """Put every bubble at rest at `height_mm`, one for all or (n,): valves shut, line at its pressure."""
+        s, p = self._state, self.parameters
+        s["stretch"] = np.asarray(height_mm) / (2e3 * p.radius)
+        s["pressure"] = ATMOSPHERE + yeoh_pressure(s["stretch"], p.mu, p.c2, p.c3, p.thickness, p.radius)
+        s["node"] = s["pressure"]
+        for name in ("fill_energised", "fill_open", "vent_energised", "vent_open"):
+            s[name] = False
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Copy everything that changes, faults and noise generator included, for `restore`."""
+        return self._state.copy(), self._air.copy(), self.time, self._rng.bit_generator.state
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
+        """Go back to a `snapshot` of this plant."""
+        self._state[:], self._air[:], self.time, self._rng.bit_generator.state = snapshot
+
+    @property
+    def stretch(self) -> NDArray[np.float64]:
+        """λ = R/r0 of each bubble, (n,)."""
+        return self._state["stretch"].copy()
+
+    @property
+    def height_mm(self) -> NDArray[np.float64]:
+        """Height 2R of each bubble in mm, (n,)."""
+        return 2e3 * self.parameters.radius * self._state["stretch"]
+
+    @property
+    def pressure_pa(self) -> NDArray[np.float64]:
+        """True gauge pressure in each bubble, Pa, (n,)."""
+        return self._state["pressure"] - ATMOSPHERE
+
+    @property
+    def node_pa(self) -> NDArray[np.float64]:
+        """True gauge pressure at each sensor, between valves and tube, Pa, (n,)."""
+        return self._state["node"] - ATMOSPHERE
+
+    @property
+    def supply_pa(self) -> float:
+        """True gauge pressure of the reservoir, Pa."""
+        return float(self._air["pressure"][0]) - ATMOSPHERE
+
+    @property
+    def air(self) -> NDArray[np.float64]:
+        """pV behind each bubble's valves, node, tube and sphere together, in J, (n,)."""
+        p, s = self.parameters, self._state
+        volume = p.tube_volume + 4 / 3 * np.pi * (p.radius * s["stretch"]) ** 3
+        return s["node"] * p.node_volume + s["pressure"] * volume
+
+    @property
+    def pumped(self) -> float:
+        """Air that the pump has brought since the start, pV in J."""
+        return float(self._air["pumped"][0])
+
+    @property
+    def vented(self) -> float:
+        """Air lost since the start through vents, dump valve and faults, pV in J."""
+        return float(self._air["vented"][0])
