@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.sim.interpreter import BUILD_OPTIONS, VERSION, build_folder, cache_folder, own_micropython
+from bubbleskin.interpreter import BUILD_OPTIONS, VERSION, build_folder, cache_folder, own_micropython
 
 SUITE = "trixie"
 """The Debian release whose source package is `VERSION`."""

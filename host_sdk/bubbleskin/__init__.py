@@ -1,6 +1,51 @@
 """Heights in, shapes out: the SDK of the bubbleskin wristbands."""
 
-from bubbleskin.physics.balloon import YeohBalloon
-from bubbleskin.physics.table import Table, build_table
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["Table", "YeohBalloon", "build_table"]
+from bubbleskin.connect import aconnect, connect
+from bubbleskin.errors import (
+    BubbleskinError,
+    DeviceFault,
+    DeviceRefused,
+    DeviceSilent,
+    InvalidInput,
+    LinkError,
+    WrongDevice,
+)
+from bubbleskin.layout import Layout
+from bubbleskin.records import Health, Info, State
+from bubbleskin.skin import AsyncSkin, Skin
+
+if TYPE_CHECKING:
+    from bubbleskin.physics import Table, YeohBalloon, build_table
+
+# The physics takes scipy, which takes a second to import; a script that only shows heights need not wait for it.
+_PHYSICS = ("Table", "YeohBalloon", "build_table")
+
+__all__ = [
+    "AsyncSkin",
+    "BubbleskinError",
+    "DeviceFault",
+    "DeviceRefused",
+    "DeviceSilent",
+    "Health",
+    "Info",
+    "InvalidInput",
+    "Layout",
+    "LinkError",
+    "Skin",
+    "State",
+    "Table",
+    "WrongDevice",
+    "YeohBalloon",
+    "aconnect",
+    "build_table",
+    "connect",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PHYSICS:
+        raise AttributeError(f"module 'bubbleskin' has no attribute {name!r}")
+    return getattr(import_module("bubbleskin.physics"), name)

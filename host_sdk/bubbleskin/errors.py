@@ -1,9 +1,29 @@
-"""The one family of errors."""
+"""The one family of errors. A message says what was asked, what is allowed and what to do next."""
 
 
 class BubbleskinError(Exception):
-    """Something went wrong that its message explains: what was asked, what was allowed, what to do next."""
+    """Something went wrong that its message explains. The command line ends with status 1."""
 
 
-class InvalidInput(BubbleskinError):  # noqa: N818 - a user reads it, and it is not the program's error
-    """What the user gave cannot be meant: refused before anything else happens."""
+class InvalidInput(BubbleskinError, ValueError):  # noqa: N818 - a user reads it, and it is not the program's error
+    """What the user gave cannot be meant: refused before anything else happens. Exit status 2."""
+
+
+class LinkError(BubbleskinError):
+    """No device can be reached, or the one that was reached has gone."""
+
+
+class DeviceSilent(LinkError, TimeoutError):  # noqa: N818
+    """The device has not answered in time."""
+
+
+class WrongDevice(LinkError):  # noqa: N818
+    """Whatever is at the other end is no wristband, or speaks another version of the protocol."""
+
+
+class DeviceRefused(BubbleskinError):  # noqa: N818
+    """The device understood a request and refused it; nothing was changed there."""
+
+
+class DeviceFault(BubbleskinError):  # noqa: N818
+    """The device reports faults, or did not do what it was asked in time."""

@@ -1,1 +1,1 @@
-"""."""
+"""The host's end of the wire: bytes, requests and replies."""

@@ -1,1 +1,6 @@
-"""."""
+"""Simulated wristbands: the real firmware, run one way or another, against one plant in virtual time."""
+
+from bubbleskin.sim.board import SimulatedBoard
+from bubbleskin.sim.transport import SimulatedTransport, open_board
+
+__all__ = ["SimulatedBoard", "SimulatedTransport", "open_board"]

@@ -1,0 +1,51 @@
+"""From a URL to a wristband: serial ports, sockets, and simulated boards."""
+
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+from bubbleskin.errors import InvalidInput
+from bubbleskin.link.session import drive
+from bubbleskin.link.transport import SerialTransport, Transport, only_attached
+from bubbleskin.skin import AsyncSkin, Skin
+
+SIMULATED = ("sim", "micropython")
+
+
+def connect(url: str | None = None, *, timeout: float = 2.0) -> Skin:
+    """Open a wristband.
+
+    `url`: a serial port (`/dev/ttyACM0`, `COM3`), `socket://host:port`, `rfc2217://host:port`, or a simulated
+    board: `sim://wristband7`, `micropython://wristband7`, with options such as `?seed=3&spread=0.1&realtime=1`.
+    None is the only wristband attached. `timeout`: seconds within which the device must answer each request.
+
+    Raises `InvalidInput` for a URL that cannot be meant, `LinkError` where nothing can be opened and
+    `WrongDevice` where what is there is no wristband.
+    """
+    transport, board = open_transport(url)
+    return Skin(drive(AsyncSkin.open(transport, _checked(timeout), simulated=board)))
+
+
+async def aconnect(url: str | None = None, *, timeout: float = 2.0) -> AsyncSkin:
+    """The same for asyncio: a skin whose methods are coroutines."""
+    transport, board = open_transport(url)
+    return await AsyncSkin.open(transport, _checked(timeout), threads=board is None, simulated=board)
+
+
+def open_transport(url: str | None) -> tuple[Transport, Any]:
+    """The transport for a URL, and the simulated board behind it where there is one."""
+    if url is None:
+        return SerialTransport(only_attached()), None
+    if not url.strip():
+        raise InvalidInput("The device's name is empty; give a port or a URL, such as sim://wristband7.")
+    parts = urlsplit(url)
+    if parts.scheme in SIMULATED:
+        from bubbleskin.sim import open_board
+
+        return open_board(parts.scheme, parts.netloc, dict(parse_qsl(parts.query, keep_blank_values=True)))
+    return SerialTransport(url), None
+
+
+def _checked(timeout: float) -> float:
+    if not 0 < timeout < float("inf"):
+        raise InvalidInput(f"timeout is {timeout}; give the seconds within which a device must answer, such as 2.")
+    return timeout

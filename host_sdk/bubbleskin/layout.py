@@ -1,0 +1,103 @@
+"""Where the bubbles are: positions, order and neighbours."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.errors import InvalidInput
+
+_NEIGHBOUR = 1.25  # bubbles nearer than this many pitches touch when they grow
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Bubble positions in mm, x to the right and y up, seen from above; entry i is bubble i everywhere."""
+
+    positions_mm: NDArray[np.float64]
+    """(n, 2)"""
+
+    pitch_mm: float
+    """Distance between the centres of neighbours."""
+
+    def __post_init__(self) -> None:
+        positions = np.array(self.positions_mm, dtype=float)
+        if positions.ndim != 2 or positions.shape[1] != 2 or not len(positions):
+            raise InvalidInput(f"A layout needs an (n, 2) array of positions in mm; this one is {positions.shape}.")
+        if not np.isfinite(positions).all():
+            raise InvalidInput("A layout's positions must be finite numbers in mm; one is not.")
+        if not (np.isfinite(self.pitch_mm) and self.pitch_mm > 0):
+            raise InvalidInput(f"The pitch must be a positive number of mm; {self.pitch_mm} is not.")
+        positions.setflags(write=False)
+        object.__setattr__(self, "positions_mm", positions)
+
+    def __len__(self) -> int:
+        return len(self.positions_mm)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Layout) and np.array_equal(self.positions_mm, other.positions_mm)
+
+    @classmethod
+    def hexagon(cls, rings: int = 1, pitch_mm: float = 10.0) -> Self:
+        """A centre and `rings` rings around it: 7, 19, 37 … bubbles.
+
+        Bubble 0 is the centre; then ring by ring, each counterclockwise from the one on the right.
+        """
+        if rings < 0:
+            raise InvalidInput(f"A hexagon has 0 or more rings; {rings} were asked.")
+        corners = [np.array([np.cos(a), np.sin(a)]) for a in np.deg2rad(np.arange(0, 420, 60))]
+        places = [np.zeros(2)]
+        for ring in range(1, rings + 1):
+            for here, there in zip(corners[:-1], corners[1:], strict=True):
+                places += [ring * here + step * (there - here) for step in range(ring)]
+        return cls(np.round(np.array(places) * pitch_mm, 6), pitch_mm)
+
+    @classmethod
+    def grid(cls, rows: int, columns: int, pitch_mm: float = 10.0) -> Self:
+        """`rows` by `columns` bubbles around the origin; row by row from the lowest y, each from the left."""
+        if rows < 1 or columns < 1:
+            raise InvalidInput(f"A grid needs at least one row and one column; {rows} by {columns} were asked.")
+        y, x = np.mgrid[0:rows, 0:columns].astype(float)
+        places = np.column_stack([x.ravel() - (columns - 1) / 2, y.ravel() - (rows - 1) / 2])
+        return cls(places * pitch_mm, pitch_mm)
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Self:
+        """Read a JSON file: `{"pitch_mm": 10, "positions_mm": [[0, 0], [10, 0], …]}`."""
+        try:
+            data: Any = json.loads(Path(path).read_text(encoding="utf-8"))
+            return cls(np.array(data["positions_mm"], dtype=float), float(data["pitch_mm"]))
+        except OSError as error:
+            raise InvalidInput(f"Cannot read the layout {path}: {error.strerror}.") from None
+        except (ValueError, KeyError, TypeError) as error:
+            raise InvalidInput(
+                f'{path} is not a layout ({error}); it should be JSON like {{"pitch_mm": 10, "positions_mm": [[0, 0], …]}}.'
+            ) from None
+
+    @classmethod
+    def of_board(cls, board: str, bubbles: int) -> Self:
+        """The layout of a board that we know by name; otherwise one row of `bubbles`."""
+        rings = {"wristband7": 1, "wristband19": 2}.get(board)
+        layout = cls.hexagon(rings) if rings is not None else cls.grid(1, bubbles)
+        if len(layout) != bubbles:
+            raise InvalidInput(f"A {board} has {len(layout)} bubbles, but this one reports {bubbles}.")
+        return layout
+
+    @cached_property
+    def neighbours(self) -> tuple[tuple[int, ...], ...]:
+        """For each bubble the bubbles around it, in order of index."""
+        gap = np.linalg.norm(self.positions_mm[:, None] - self.positions_mm[None], axis=2)
+        near = (gap > 0) & (gap < _NEIGHBOUR * self.pitch_mm)
+        return tuple(tuple(np.flatnonzero(row).tolist()) for row in near)
+
+    def names(self, bubbles: Sequence[int]) -> str:
+        """How to name some bubbles in a sentence: 'bubble 3', 'bubbles 1, 4 and 5'."""
+        words = [str(bubble) for bubble in bubbles]
+        if len(words) == 1:
+            return f"bubble {words[0]}"
+        return f"bubbles {', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,132 @@
+"""Requests and replies over one transport: each request has one reply or one error, in time."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Coroutine, Sequence
+from typing import Any, TypeVar
+
+from bubble_protocol import codec, messages
+from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
+from bubbleskin.errors import DeviceRefused, DeviceSilent, WrongDevice
+from bubbleskin.link import wire
+from bubbleskin.link.transport import Transport
+
+RESEND = 0.25
+"""Seconds after which a request without a reply is sent again. Every request of this version may be
+handled twice with the same outcome."""
+
+_TELEMETRY_KEPT = 4096
+
+_T = TypeVar("_T")
+
+
+class Link:
+    """One device at the other end of `transport`.
+
+    Everything is a coroutine. With `threads` false the transport is read in place and no coroutine ever
+    suspends, so that `drive` can run it without an event loop; with true it is read in a thread.
+    """
+
+    def __init__(self, transport: Transport, timeout: float, *, threads: bool = False):
+        self.transport = transport
+        self.timeout = timeout
+        self.telemetry: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
+        self._threads = threads
+        self._reader = wire.Reader()
+        self._replies: dict[int, wire.Received] = {}
+        self._sequence = 0
+        self._reading = asyncio.Lock()
+        self._pending: asyncio.Future[bytes] | None = None
+        transport.write(b"\0")  # whatever half frame stood on the line ends here
+
+    async def hello(self) -> wire.Received:
+        """Ask who is there. `WrongDevice` where that is no wristband or one we cannot talk to."""
+        try:
+            reply = await self.call("HELLO", (PROTOCOL_MIN, PROTOCOL_MAX))
+        except DeviceSilent:
+            heard = "It sends data, but not ours." if self._reader.bad else "It says nothing at all."
+            raise WrongDevice(
+                f"What is at {self.transport.name} does not answer as a wristband within {self.timeout:g} s. {heard} "
+                "Check that it is the right port and that the wristband runs bubbleskin firmware."
+            ) from None
+        low, high = reply["protocol_min"], reply["protocol_max"]
+        if high < PROTOCOL_MIN or low > PROTOCOL_MAX:
+            raise WrongDevice(_version_sentence(low, high))
+        return reply
+
+    async def call(
+        self, name: str, fixed: Sequence[int] = (), repeated: Sequence[Sequence[int]] = (), timeout: float | None = None
+    ) -> wire.Received:
+        """Send a request and wait for its reply. `DeviceRefused` or `DeviceSilent` where there is none."""
+        sequence = self._sequence = self._sequence + 1 & 0xFFFF
+        request = codec.BY_NAME[name].id
+        frame = wire.encode(name, sequence, fixed, repeated)
+        patience = self.timeout if timeout is None else timeout
+        deadline = self.transport.now() + patience
+        while (now := self.transport.now()) < deadline:
+            self.transport.write(frame)
+            await self.wait(min(deadline, now + RESEND), lambda: sequence in self._replies)
+            reply = self._replies.pop(sequence, None)
+            if reply is None:
+                continue
+            if reply.id == messages.ERROR:
+                if reply["error"] == messages.NO_COMMON_PROTOCOL:
+                    raise WrongDevice(_version_sentence(reply["low"], reply["high"]))
+                raise DeviceRefused(wire.explain(reply))
+            if reply.id == request | messages.REPLY:
+                return reply
+        raise DeviceSilent(
+            f"The wristband at {self.transport.name} has not answered {name} within {patience:g} s. "
+            "Check its cable and power, then connect again."
+        )
+
+    async def wait(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
+        """Take what comes until `done()` or the transport's clock stands at `until`."""
+        while not done() and (left := until - self.transport.now()) > 0:
+            async with self._reading:
+                if not done():
+                    self._take(await self._read(left))
+
+    def close(self) -> None:
+        """Let go of the transport."""
+        self.transport.close()
+
+    def _take(self, data: bytes) -> None:
+        for message in self._reader.feed(data):
+            if message.id == messages.TELEMETRY:
+                self.telemetry.append(message)
+            elif message.id & messages.REPLY or message.id == messages.ERROR:
+                # Replies to requests given up long ago are dropped when their number comes round again.
+                if len(self._replies) > 64:
+                    self._replies.clear()
+                self._replies[message.sequence] = message
+
+    async def _read(self, timeout: float) -> bytes:
+        if not self._threads:
+            return self.transport.read(timeout)
+        # A cancelled wait must not lose what the thread is about to read: the next one takes it up.
+        if self._pending is None:
+            self._pending = asyncio.ensure_future(asyncio.to_thread(self.transport.read, min(timeout, 0.05)))
+        pending = self._pending
+        try:
+            return await asyncio.shield(pending)
+        finally:
+            if pending.done():
+                self._pending = None
+
+
+def drive(coroutine: Coroutine[Any, Any, _T]) -> _T:
+    """Run a coroutine that never suspends, as all of a `Link` without threads are."""
+    try:
+        coroutine.send(None)
+    except StopIteration as finished:
+        return finished.value
+    coroutine.close()
+    raise RuntimeError("a coroutine of the synchronous link has suspended")
+
+
+def _version_sentence(low: int, high: int) -> str:
+    theirs = f"protocol {low}" if low == high else f"protocols {low} to {high}"
+    if high < PROTOCOL_MIN:
+        return f"The wristband speaks {theirs}, this SDK {PROTOCOL_MIN} and newer: update the wristband's firmware."
+    return f"The wristband speaks {theirs}, this SDK at most {PROTOCOL_MAX}: update it with `pip install --upgrade bubbleskin`."

@@ -1,0 +1,110 @@
+"""Bytes to and from a device, and the clock that waiting for them is measured by."""
+
+import contextlib
+import errno
+import time
+from typing import Protocol
+
+import serial
+from serial.tools import list_ports
+
+from bubbleskin.errors import InvalidInput, LinkError
+
+USB_IDS = ((0x2E8A, 0x0005),)
+"""Vendor and product of a Pico that runs MicroPython."""
+
+
+class Transport(Protocol):
+    """What the link needs of a way to a device."""
+
+    name: str
+
+    def read(self, timeout: float) -> bytes:
+        """Wait up to `timeout` seconds of this transport's own clock for bytes; none when none came."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`."""
+
+    def now(self) -> float:
+        """Seconds on the clock of `read`'s timeout: the wall's, or a simulation's virtual one."""
+
+    def close(self) -> None:
+        """Let go of the device."""
+
+
+class SerialTransport:
+    """A serial port, or anything that pyserial opens: /dev/ttyACM0, COM3, socket://…, rfc2217://…"""
+
+    def __init__(self, url: str):
+        self.name = url
+        exclusive = {"exclusive": True} if "://" not in url else {}
+        try:
+            self._port = serial.serial_for_url(url, baudrate=115200, timeout=0, write_timeout=2.0, **exclusive)
+        except ValueError as error:
+            raise InvalidInput(f"{url} is not a port or URL that can be opened: {error}.") from None
+        except (serial.SerialException, OSError) as error:
+            raise LinkError(_why_not(url, error)) from None
+
+    def read(self, timeout: float) -> bytes:
+        """Wait up to `timeout` seconds for bytes; take all that are there."""
+        try:
+            self._port.timeout = max(timeout, 0.0)
+            first = self._port.read(1)
+            if not first:
+                return b""
+            self._port.timeout = 0
+            return bytes(first + self._port.read(4096))
+        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed under our feet
+            raise LinkError(f"The connection to {self.name} is lost ({error}). Check the cable and connect again.") from None
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`."""
+        try:
+            self._port.write(data)
+        except serial.SerialTimeoutException:
+            raise LinkError(f"{self.name} takes no data. It may hang: unplug it, plug it in and connect again.") from None
+        except (serial.SerialException, OSError) as error:
+            raise LinkError(f"The connection to {self.name} is lost ({error}). Check the cable and connect again.") from None
+
+    def now(self) -> float:
+        """The wall clock's seconds."""
+        return time.monotonic()
+
+    def close(self) -> None:
+        """Let go of the port."""
+        with contextlib.suppress(serial.SerialException, OSError):
+            self._port.close()
+
+
+def attached() -> list[str]:
+    """The ports of all wristbands plugged in, by USB id."""
+    return sorted(port.device for port in list_ports.comports() if (port.vid, port.pid) in USB_IDS)
+
+
+def only_attached() -> str:
+    """The port of the one wristband that is plugged in; `LinkError` where there is none, or more than one."""
+    ports = attached()
+    if not ports:
+        raise LinkError(
+            "No wristband is attached. Plug one in, name its port, or use a simulated one: sim://wristband7."
+        )
+    if len(ports) > 1:
+        raise LinkError(f"{len(ports)} wristbands are attached, at {', '.join(ports)}: name the one you mean.")
+    return ports[0]
+
+
+def _why_not(url: str, error: Exception) -> str:
+    """Why a port does not open, in a sentence."""
+    code = getattr(error, "errno", None)
+    text = str(error)
+    if code == errno.ENOENT or "could not find" in text:
+        ports = [port.device for port in list_ports.comports()]
+        there = f"The ports here are {', '.join(sorted(ports))}." if ports else "No serial port is here at all."
+        return f"There is no {url}. {there} Without a wristband, use sim://wristband7."
+    if code in (errno.EACCES, errno.EPERM):
+        return f"You may not open {url}. On Linux, join its group (often `sudo usermod -aG dialout $USER`) and log in again."
+    if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK) or "exclusively lock" in text:
+        return f"{url} is in use by another program. Close it, or use `lsof {url}` to find it."
+    if "refused" in text.lower():
+        return f"Nothing listens at {url}. Start it first, for example with `bubbleskin sim --port 7707`."
+    return f"Cannot open {url}: {text}."

@@ -1,0 +1,122 @@
+"""What a device says of itself, as plain values."""
+
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubble_protocol import messages
+from bubbleskin.link.wire import SCHEMA_CRC, Received
+
+_MODES = {number: name for number, name, _ in messages.MODES}
+_STATUSES = {number: name for number, name, _ in messages.STATUSES}
+
+
+@dataclass(frozen=True)
+class Info:
+    """Who a device is: constant from one boot to the next, but for `tables_crc`."""
+
+    board: str
+    bubbles: int
+    firmware: str
+    protocol: tuple[int, int]
+    same_schema: bool
+    """Whether device and SDK were made from the same message schema."""
+    boot_id: int
+    tick: float
+    """Period of the control loop, s."""
+    height_rest_mm: float
+    height_max_mm: float
+    pressure_max_kpa: float
+    tables_crc: int
+
+    @classmethod
+    def of(cls, hello: Received) -> Self:
+        """From the reply to HELLO."""
+        return cls(
+            board=str(hello.fields["board"]),
+            bubbles=hello["bubbles"],
+            firmware=f"{hello['firmware_major']}.{hello['firmware_minor']}.{hello['firmware_patch']}",
+            protocol=(hello["protocol_min"], hello["protocol_max"]),
+            same_schema=hello["schema_crc"] == SCHEMA_CRC,
+            boot_id=hello["boot_id"],
+            tick=hello["tick_us"] * 1e-6,
+            height_rest_mm=hello["height_rest_um"] / 1000,
+            height_max_mm=hello["height_max_um"] / 1000,
+            pressure_max_kpa=hello["pressure_max_pa"] / 1000,
+            tables_crc=hello["tables_crc"],
+        )
+
+
+@dataclass(frozen=True)
+class Health:
+    """How a device is: its counters since boot."""
+
+    time: float
+    """Device time, s since boot."""
+    late_ticks: int
+    tick_worst: float
+    """The longest tick, s."""
+    exceptions: int
+    """Exceptions that made the firmware vent."""
+    frames_good: int
+    frames_bad: int
+    telemetry_dropped: int
+    heap_free: int
+    """Bytes; 0 where the heap has no limit."""
+    supply_kpa: float
+    tables_crc: int
+    mode: str
+
+    @classmethod
+    def of(cls, reply: Received, tick: float) -> Self:
+        """From the reply to INFO."""
+        names = {field.name for field in fields(cls)} & set(reply.fields)
+        same: dict[str, Any] = {name: reply[name] for name in names - {"mode"}}
+        return cls(
+            time=reply["ticks"] * tick,
+            tick_worst=reply["tick_worst_us"] * 1e-6,
+            supply_kpa=reply["supply_pa"] / 1000,
+            mode=_MODES[reply["mode"]],
+            **same,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All bubbles at one moment; arrays have one entry per bubble, in layout order."""
+
+    time: float
+    """Device time, s since boot."""
+    mode: str
+    """vented, active or holding."""
+    height_mm: NDArray[np.float64]
+    """The firmware's estimate."""
+    pressure_kpa: NDArray[np.float64]
+    """Gauge, at the sensor."""
+    target_mm: NDArray[np.float64]
+    status: tuple[str, ...]
+    """resting, moving, settled, stopped or fault."""
+    faults: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def of(cls, message: Received, tick: float) -> Self:
+        """From the reply to STATE, or from TELEMETRY."""
+        columns = message.columns
+        return cls(
+            time=message["ticks"] * tick,
+            mode=_MODES[message["mode"]],
+            height_mm=columns["height_um"] / 1000,
+            pressure_kpa=columns["pressure_pa"] / 1000,
+            target_mm=columns["target_um"] / 1000,
+            status=tuple(_STATUSES[status] for status in columns["status"].tolist()),
+            faults=tuple(
+                tuple(name for bit, name, _ in messages.FAULTS if faults & bit) for faults in columns["faults"].tolist()
+            ),
+        )
+
+    @property
+    def settled(self) -> bool:
+        """Whether every bubble is where it was asked to be: settled there, or resting without pressure."""
+        return all(status in ("settled", "resting") for status in self.status)

@@ -1,0 +1,1 @@
+"""Shapes: from what a user means to one height per bubble."""

@@ -1,0 +1,102 @@
+"""The firmware in a real MicroPython (unix port), a subprocess with a heap like the board's, in lockstep."""
+
+import contextlib
+import select
+import subprocess
+import sys
+import tempfile
+from array import array
+from pathlib import Path
+from types import ModuleType
+
+import bubble_firmware
+import bubble_protocol
+from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT
+from bubbleskin.errors import LinkError
+from bubbleskin.sim.board import Outputs
+from bubbleskin.interpreter import find_micropython
+
+HEAP = "190k"
+"""As much as is free for the firmware on a Pico, or less."""
+
+_PATIENCE = 10.0  # wall seconds for one tick, which takes well under a millisecond
+
+_PROGRAM = """
+import sys
+sys.path[:] = {path!r}
+from bubble_firmware.main import lockstep
+lockstep({board!r}, {boot_id})
+"""
+
+
+def source_path() -> list[str]:
+    """The folders that hold the packages which run on the device."""
+    return [str(Path(package.__path__[0]).parent) for package in (bubble_protocol, bubble_firmware)]
+
+
+class MicroPythonFirmware:
+    """A `Firmware` in another process, talked to through `bubble_firmware.boards.lockstep`."""
+
+    def __init__(self, board: ModuleType, boot_id: int):
+        program = _PROGRAM.format(path=source_path(), board=board.NAME, boot_id=boot_id)
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has died
+        self._process = subprocess.Popen(
+            [find_micropython(), "-X", f"heapsize={HEAP}", "-c", program],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            bufsize=0,
+        )
+        self._n = board.BUBBLES
+        self._size = 2 + 4 * self._n + 4 + LINK_OUT
+
+    def tick(self, counts: array, link: bytes) -> Outputs:
+        """See `Firmware`."""
+        block = len(link).to_bytes(2, "little") + counts.tobytes() + link.ljust(LINK_IN, b"\0")
+        try:
+            assert self._process.stdin is not None
+            self._process.stdin.write(block)
+        except OSError:
+            raise self._died() from None
+        answer = self._read()
+        sent = int.from_bytes(answer[:2], "little")
+        pulses = array("H", answer[2 : 2 + 4 * self._n])
+        pump, dump = array("H", answer[2 + 4 * self._n : 6 + 4 * self._n])
+        if sys.byteorder == "big":
+            pulses.byteswap()
+        at = self._size - LINK_OUT
+        return Outputs(pulses, pump, bool(dump), answer[at : at + sent])
+
+    def close(self) -> None:
+        """End the process."""
+        with contextlib.suppress(OSError):
+            for pipe in (self._process.stdin, self._process.stdout):
+                if pipe:
+                    pipe.close()
+        try:
+            self._process.wait(1.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._errors.close()
+
+    def _read(self) -> bytes:
+        pipe = self._process.stdout
+        assert pipe is not None
+        answer = b""
+        while len(answer) < self._size:
+            ready, _, _ = select.select([pipe], [], [], _PATIENCE)
+            if not ready:
+                self._process.kill()
+                raise LinkError(f"The firmware in MicroPython has hung: no tick within {_PATIENCE:g} s.")
+            part = pipe.read(self._size - len(answer))
+            if not part:
+                raise self._died()
+            answer += part
+        return answer
+
+    def _died(self) -> LinkError:
+        status = self._process.wait()
+        self._errors.seek(0)
+        lines = self._errors.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
+        return LinkError(f"The firmware in MicroPython has ended with status {status}: {lines[-1]}")

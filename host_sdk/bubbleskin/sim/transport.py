@@ -1,0 +1,114 @@
+"""The link to a simulated board: reading with a timeout lets virtual time pass."""
+
+import time
+from dataclasses import dataclass
+
+from bubbleskin.errors import InvalidInput, LinkError
+from bubbleskin.sim.board import SimulatedBoard, load_board
+
+_BEHIND = 0.1  # seconds a real-time simulation may lag before it gives up catching up
+
+
+class SimulatedTransport:
+    """A `Transport` to a `SimulatedBoard`. With `realtime`, virtual time keeps pace with the wall's."""
+
+    def __init__(self, board: SimulatedBoard, name: str, realtime: bool = False):
+        self.board = board
+        self.name = name
+        self._pace = Pace(board) if realtime else None
+        self._closed = False
+
+    def read(self, timeout: float) -> bytes:
+        """Step the board until it sends something or `timeout` virtual seconds have passed."""
+        self._check()
+        board = self.board
+        until = board.time + timeout
+        while not board.from_device and board.time < until:
+            if self._pace:
+                self._pace.wait()
+            board.tick()
+        data = bytes(board.from_device)
+        board.from_device.clear()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Hand bytes to the board; it reads them in its next tick."""
+        self._check()
+        self.board.to_device += data
+
+    def now(self) -> float:
+        """Virtual seconds since the board's start."""
+        return self.board.time
+
+    def close(self) -> None:
+        """End the simulation."""
+        self._closed = True
+        self.board.close()
+
+    def _check(self) -> None:
+        if self._closed:
+            raise LinkError(f"The connection to {self.name} is closed; connect again.")
+
+
+class Pace:
+    """Keeps a board's virtual time at the wall's, tick by tick."""
+
+    def __init__(self, board: SimulatedBoard):
+        self._board = board
+        self._start = time.monotonic() - board.time
+
+    def owed(self) -> float:
+        """Seconds that the board is behind the wall clock; below zero where it is ahead."""
+        owed = time.monotonic() - self._start - self._board.time
+        if owed > _BEHIND:  # the machine is too slow, or was asleep: let virtual time slip
+            self._start += owed
+            return 0.0
+        return owed
+
+    def wait(self) -> None:
+        """Sleep until the next tick is due."""
+        ahead = -self.owed()
+        if ahead > 0:
+            time.sleep(ahead)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What may follow the `?` of a simulated board's URL."""
+
+    seed: int = 0
+    spread: float = 0.0
+    realtime: bool = False
+
+    @classmethod
+    def parse(cls, options: dict[str, str], url: str) -> "Options":
+        """From the URL's query; `InvalidInput` for what is not known or not a number."""
+        values: dict[str, float] = {}
+        for key, text in options.items():
+            if key not in cls.__dataclass_fields__:
+                known = ", ".join(cls.__dataclass_fields__)
+                raise InvalidInput(f"{url} has the option {key!r}; known are {known}.")
+            try:
+                values[key] = float(text) if key == "spread" else int(text)
+            except ValueError:
+                raise InvalidInput(f"{url} has {key}={text!r}, which is not a number.") from None
+        return cls(int(values.get("seed", 0)), values.get("spread", 0.0), bool(values.get("realtime", 0)))
+
+
+def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[SimulatedTransport, SimulatedBoard]:
+    """The board of `sim://name?…` or `micropython://name?…`, and the link to it."""
+    url = f"{scheme}://{name}"
+    chosen = Options.parse(options, url)
+    data = load_board(name)
+    firmware = None
+    if scheme == "micropython":
+        from bubbleskin.sim.micropython import MicroPythonFirmware
+
+        firmware = MicroPythonFirmware(data, boot_id=chosen.seed + 1)
+    try:
+        board = SimulatedBoard(name, seed=chosen.seed, spread=chosen.spread, firmware=firmware)
+    except BaseException:
+        if firmware:
+            firmware.close()
+        raise
+    return SimulatedTransport(board, url, chosen.realtime), board

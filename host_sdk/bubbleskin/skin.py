@@ -1,0 +1,275 @@
+"""What a script holds: one wristband, real or simulated. `AsyncSkin` does the work, `Skin` runs it without an event loop."""
+
+import contextlib
+from collections.abc import AsyncGenerator, Iterator, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput, LinkError
+from bubbleskin.layout import Layout
+from bubbleskin.link.session import Link, drive
+from bubbleskin.link.transport import Transport
+from bubbleskin.link.wire import crc32
+from bubbleskin.records import Health, Info, State
+from bubbleskin.shape.heightfield import Heights, sample
+
+if TYPE_CHECKING:
+    from bubbleskin.physics.table import Table
+    from bubbleskin.sim.board import SimulatedBoard
+
+SETTLE = 3.0
+"""Seconds beyond `over` after which `show` gives up waiting; the valves need about half of one."""
+
+_POLL = 0.02
+_KNOTS_PER_MESSAGE = 48
+OVER_MAX = 60.0
+
+
+class AsyncSkin:
+    """A wristband, for asyncio; made by `bubbleskin.aconnect`. Methods and attributes as of `Skin`."""
+
+    def __init__(self, link: Link, info: Info, layout: Layout, simulated: "SimulatedBoard | None" = None):
+        self._link = link
+        self.info = info
+        self.layout = layout
+        self.simulated = simulated
+
+    @classmethod
+    async def open(
+        cls, transport: Transport, timeout: float, *, threads: bool = False, simulated: "SimulatedBoard | None" = None
+    ) -> Self:
+        """Greet the device at the other end of `transport`."""
+        try:
+            link = Link(transport, timeout, threads=threads)
+            info = Info.of(await link.hello())
+            return cls(link, info, Layout.of_board(info.board, info.bubbles), simulated)
+        except BaseException:
+            transport.close()
+            raise
+
+    async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
+        """See `Skin.show`."""
+        heights = sample(heights_mm, self.layout, self.info.height_max_mm)
+        if not 0.0 <= over <= OVER_MAX:
+            raise InvalidInput(f"over is {over} s; a change may take 0 to {OVER_MAX:g} s.")
+        micrometres = np.rint(heights * 1000).astype(int).tolist()
+        await self._link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
+        if not wait:
+            return None
+        return await self._settle(over + SETTLE)
+
+    async def _settle(self, patience: float) -> State:
+        deadline = self._link.transport.now() + patience
+        while True:
+            state = await self.state()
+            ill = [bubble for bubble, faults in enumerate(state.faults) if faults]
+            if ill:
+                what = "; ".join(f"bubble {bubble}: {', '.join(state.faults[bubble])}" for bubble in ill)
+                raise DeviceFault(f"The wristband reports faults ({what}). Mend the cause, then `clear_faults()`.")
+            if state.mode != "active":
+                raise DeviceFault(f"The wristband is {state.mode} in the middle of a show: it was stopped or vented.")
+            if state.settled:
+                return state
+            if self._link.transport.now() >= deadline:
+                late = [bubble for bubble, status in enumerate(state.status) if status == "moving"]
+                where = ", ".join(f"{state.height_mm[b]:.2f} instead of {state.target_mm[b]:.2f} mm" for b in late)
+                raise DeviceFault(
+                    f"{self.layout.names(late).capitalize()} did not settle within {patience:g} s: at {where}. "
+                    "Check the supply pressure in `health()`, leaks and kinked tubes."
+                )
+            await self.sleep(_POLL)
+
+    async def state(self) -> State:
+        """See `Skin.state`."""
+        return State.of(await self._link.call("STATE"), self.info.tick)
+
+    async def health(self) -> Health:
+        """See `Skin.health`."""
+        return Health.of(await self._link.call("INFO"), self.info.tick)
+
+    async def telemetry(self, rate_hz: float = 20) -> AsyncGenerator[State]:
+        """See `Skin.telemetry`."""
+        highest = 1 / self.info.tick
+        if not 0 < rate_hz <= highest:
+            raise InvalidInput(f"rate_hz is {rate_hz}; telemetry comes more than 0 and up to {highest:g} times a second.")
+        period = max(1, round(highest / rate_hz))
+        link = self._link
+        link.telemetry.clear()
+        await link.call("SUBSCRIBE", (period,))
+        patience = period * self.info.tick + link.timeout
+        try:
+            while True:
+                await link.wait(link.transport.now() + patience, lambda: bool(link.telemetry))
+                if not link.telemetry:
+                    await link.call("PING", (0,))  # says what is wrong where the device has gone
+                    continue
+                yield State.of(link.telemetry.popleft(), self.info.tick)
+        except GeneratorExit:
+            with contextlib.suppress(LinkError):
+                await link.call("SUBSCRIBE", (0,))
+            raise
+
+    async def stop(self) -> None:
+        """See `Skin.stop`."""
+        await self._link.call("STOP")
+
+    async def vent(self) -> None:
+        """See `Skin.vent`."""
+        await self._link.call("VENT")
+
+    async def faults(self) -> dict[int, tuple[str, ...]]:
+        """See `Skin.faults`."""
+        state = await self.state()
+        return {bubble: faults for bubble, faults in enumerate(state.faults) if faults}
+
+    async def clear_faults(self) -> None:
+        """See `Skin.clear_faults`."""
+        await self._link.call("CLEAR")
+
+    async def upload_tables(self, tables: "Sequence[Table] | Table") -> None:
+        """See `Skin.upload_tables`."""
+        n = self.info.bubbles
+        each = list(tables) if isinstance(tables, Sequence) else [tables] * n
+        if len(each) != n:
+            raise InvalidInput(f"{len(each)} tables for {n} bubbles: give one per bubble, or one for all.")
+        data = [table.to_bytes() for table in each]
+        for bubble, table in enumerate(data):
+            knots = np.frombuffer(table, "<u2").reshape(-1, 2).tolist()
+            for first in range(0, len(knots), _KNOTS_PER_MESSAGE):
+                part = knots[first : first + _KNOTS_PER_MESSAGE]
+                await self._link.call("TABLE_WRITE", (bubble, first, len(knots)), part)
+        crc = crc32(b"".join(data))
+        reply = await self._link.call("TABLE_COMMIT", (crc,))
+        if reply["tables_crc"] != crc:
+            raise DeviceRefused("The wristband uses other tables than were sent. Upload them again.")
+
+    async def read_tables(self) -> "list[Table]":
+        """See `Skin.read_tables`."""
+        from bubbleskin.physics.table import Table
+
+        tables = []
+        for bubble in range(self.info.bubbles):
+            knots: list[list[int]] = []
+            total = 1
+            while len(knots) < total:
+                part = await self._link.call("TABLE_READ", (bubble, len(knots)))
+                total = part["total"]
+                knots += np.column_stack([part.columns["knot_um"], part.columns["knot_pa"]]).tolist()
+            tables.append(Table(*np.array(knots).T))
+        return tables
+
+    async def sleep(self, seconds: float) -> None:
+        """See `Skin.sleep`."""
+        await self._link.wait(self._link.transport.now() + seconds)
+
+    async def aclose(self) -> None:
+        """Let go of the device. It keeps its shape; `vent` first to leave it flat."""
+        self._link.close()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.aclose()
+
+
+class Skin:
+    """A wristband, real or simulated; made by `bubbleskin.connect`.
+
+    Every method raises `LinkError` when the device cannot be reached (`DeviceSilent` when it does not answer
+    in time), `DeviceRefused` when it refuses, and `InvalidInput` before a byte is sent when what is asked
+    cannot be meant. Use it in a `with` block to let go of the device at the end.
+    """
+
+    def __init__(self, skin: AsyncSkin):
+        self._skin = skin
+
+    @property
+    def info(self) -> Info:
+        """Who the device is: board, firmware, limits."""
+        return self._skin.info
+
+    @property
+    def layout(self) -> Layout:
+        """Where its bubbles are."""
+        return self._skin.layout
+
+    @property
+    def simulated(self) -> "SimulatedBoard | None":
+        """The simulated board behind this skin, with its true heights and its faults; None for a real one."""
+        return self._skin.simulated
+
+    def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
+        """Take a shape.
+
+        `heights_mm`: one height per bubble (n,), a 2-D heightfield stretched over the layout, or f(x_mm, y_mm).
+        Heights from 0 to `info.height_max_mm`; up to `info.height_rest_mm` means no pressure. `over`: seconds
+        the change should take, 0 as fast as the valves can. With `wait`, returns the state once every bubble
+        has settled and raises `DeviceFault` if one does not; otherwise returns None at once.
+        """
+        return drive(self._skin.show(heights_mm, over, wait))
+
+    def state(self) -> State:
+        """Heights, pressures, targets and status of all bubbles, now."""
+        return drive(self._skin.state())
+
+    def health(self) -> Health:
+        """Counters since boot: late ticks, exceptions, frames, free heap, supply pressure."""
+        return drive(self._skin.health())
+
+    def telemetry(self, rate_hz: float = 20) -> Iterator[State]:
+        """States as the device sends them, without end; close the iterator or leave the loop to end it."""
+        states = self._skin.telemetry(rate_hz)
+        try:
+            while True:
+                yield drive(_next(states))
+        finally:
+            drive(states.aclose())
+
+    def stop(self) -> None:
+        """Close all valves and keep the air, until the next `show`."""
+        drive(self._skin.stop())
+
+    def vent(self) -> None:
+        """Open all vent valves, until the next `show`."""
+        drive(self._skin.vent())
+
+    def faults(self) -> dict[int, tuple[str, ...]]:
+        """The faults of every bubble that has some."""
+        return drive(self._skin.faults())
+
+    def clear_faults(self) -> None:
+        """Forget all faults; a bubble that still has one faults again."""
+        drive(self._skin.clear_faults())
+
+    def upload_tables(self, tables: "Sequence[Table] | Table") -> None:
+        """Use other height to pressure tables: one per bubble in layout order, or one for all; all or none are taken."""
+        drive(self._skin.upload_tables(tables))
+
+    def read_tables(self) -> "list[Table]":
+        """The tables in use, one per bubble."""
+        return drive(self._skin.read_tables())
+
+    def sleep(self, seconds: float) -> None:
+        """Wait on the device's clock: virtual time on a simulated board, real time on a real one."""
+        drive(self._skin.sleep(seconds))
+
+    def close(self) -> None:
+        """Let go of the device. It keeps its shape; `vent` first to leave it flat."""
+        drive(self._skin.aclose())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+async def _next(states: AsyncGenerator[State]) -> State:
+    return await anext(states)
