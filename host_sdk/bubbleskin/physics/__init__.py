@@ -5,7 +5,7 @@ from bubbleskin.physics.calibration import Calibration, compare_tables, table_di
 from bubbleskin.physics.data import BadRowWarning, Measurements, read_csv, write_csv
 from bubbleskin.physics.fit import IdentifiabilityWarning, LackOfFitWarning, Parameters, YeohFit, fit_yeoh
 from bubbleskin.physics.presets import PRESETS, Preset, preset
-from bubbleskin.physics.sheet import SheetFit, fit_sheet
+from bubbleskin.physics.sheet import SheetFit, fit_measurements, fit_sheet
 from bubbleskin.physics.synthetic import simulate_sheet
 from bubbleskin.physics.table import Table, TableError, build_table
 
@@ -27,6 +27,7 @@ __all__ = [
     "YeohFit",
     "build_table",
     "compare_tables",
+    "fit_measurements",
     "fit_sheet",
     "fit_yeoh",
     "preset",

@@ -54,6 +54,43 @@ class Calibration:
         """CRC-32 of all tables' bytes one after the other, as the firmware computes it."""
         return zlib.crc32(b"".join(table.to_bytes() for table in self.tables))
 
+    def table(self, bubble: int) -> Table:
+        """The table of one bubble, counted from 0."""
+        if not 0 <= bubble < len(self.tables):
+            raise InvalidInput(f"there is no bubble {bubble}: they are numbered 0 to {len(self.tables) - 1}.")
+        return self.tables[bubble]
+
+    def report(self) -> str:
+        """The tables in a few lines of text: their ends, their bound, their checksums."""
+        lines = [f"{self.board}: {len(self.tables)} tables, CRC-32 {self.crc32:08x}; {self.source}"]
+        for bubble, table in enumerate(self.tables):
+            bound = ""
+            if table.balloon is not None:
+                error = table.max_error()
+                bound = f", every height within {error.pressure_pa:.1f} Pa or {error.height_um:.1f} µm"
+            lines.append(
+                f"  bubble {bubble}: {len(table)} knots from {table.height_um[0] / 1000:.3f} mm to "
+                f"{table.height_um[-1] / 1000:.3f} mm, {table.pressure_pa.max() / 1000:.3f} kPa{bound}"
+            )
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers with units in their names, for JSON."""
+        bubbles = []
+        for table in self.tables:
+            one: dict[str, Any] = {
+                "height_um": table.height_um.tolist(),
+                "pressure_pa": table.pressure_pa.tolist(),
+                "crc32": f"{table.crc32:08x}",
+            }
+            if table.balloon is not None:
+                error = table.max_error()
+                one["max_error"] = {"pressure_pa": error.pressure_pa, "height_um": error.height_um}
+            bubbles.append(one)
+        return {
+            "board": self.board, "source": self.source, "crc32": f"{self.crc32:08x}", "bubbles": bubbles,
+        }  # fmt: skip
+
     def differences(self, other: Calibration) -> list[str]:
         """What differs in ``other``, one sentence each; empty if both run the firmware alike."""
         found = []
@@ -69,7 +106,10 @@ class Calibration:
 
     def save(self, path: str | Path) -> None:
         """Write the calibration as text to ``path``."""
-        Path(path).write_text(self.to_text(), encoding="utf-8")
+        try:
+            Path(path).write_text(self.to_text(), encoding="utf-8")
+        except OSError as error:
+            raise InvalidInput(f"cannot write {path}: {error.strerror}.") from None
 
     @classmethod
     def load(cls, path: str | Path) -> Calibration:

@@ -78,6 +78,11 @@ class YeohFit:
         """Which points were as good as ignored, (n,) bool."""
         return self.weights < 0.1
 
+    @property
+    def balloons(self) -> list[YeohBalloon]:
+        """The fitted balloon in a list, as a sheet's fit has several."""
+        return [self.balloon]
+
     def interval(self, level: float = 0.95) -> np.ndarray:
         """Confidence interval of each constant, (3, 2) in Pa; C3's is cut off at 0."""
         half = self._quantile(level) * np.sqrt(np.diag(self.covariance))
@@ -126,6 +131,24 @@ class YeohFit:
         )
         lines += [f"  note: {note}" for note in self.notes]
         return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fit as plain numbers with units in their names, for JSON."""
+        ends = self.interval()
+        return {
+            **{f"{name}_pa": value for name, value in self.parameters._asdict().items()},
+            **{f"{name}_95_pa": list(map(float, ends[k])) for k, name in enumerate(Parameters._fields)},
+            "covariance_pa2": self.covariance.tolist(),
+            "thickness_mm": self.shape.thickness * 1e3,
+            "diameter_mm": self.shape.radius * 2e3,
+            "diameter_is": self.shape.surface,
+            "wall": self.shape.wall,
+            "points": int(self.residuals.size),
+            "outliers": np.flatnonzero(self.outliers).tolist(),
+            "noise_found_over_stated": self.scale,
+            "limit_points_kpa": [point.pressure / 1e3 for point in self.balloon.limit_points()],
+            "notes": list(self.notes),
+        }
 
     def _quantile(self, level: float) -> float:
         if not 0 < level < 1:

@@ -17,6 +17,7 @@ import numpy as np
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.physics.balloon import Surface, Wall, YeohBalloon
+from bubbleskin.physics.data import Measurements
 from bubbleskin.physics.fit import (
     HEIGHT_SD,
     LEAST_POINTS,
@@ -26,6 +27,7 @@ from bubbleskin.physics.fit import (
     YeohFit,
     as_points,
     finish,
+    fit_yeoh,
     open_constants,
 )
 from bubbleskin.physics.regression import (
@@ -84,6 +86,54 @@ class SheetFit(Mapping[int, YeohFit]):
     def balloons(self) -> list[YeohBalloon]:
         """The fitted balloons in the order of the bubble numbers."""
         return [fit.balloon for fit in self.fits.values()]
+
+    def report(self) -> str:
+        """The fits in one table of text, with units, and what not to trust."""
+        lines = [next(iter(self.fits.values())).balloon.describe().split(";")[0]]
+        lines.append("bubble   points  out      mu (kPa)           C2 (Pa)            C3 (Pa)")
+        for number, fit in self.fits.items():
+            half = np.diff(fit.interval(), axis=1)[:, 0] / 2
+            mu, c2, c3 = fit.parameters
+            lines.append(
+                f"{number:6d} {fit.residuals.size:8d} {int(fit.outliers.sum()):4d}  {mu / 1e3:8.3f} ± "
+                f"{half[0] / 1e3:5.3f}   {c2:8.1f} ± {half[1]:6.1f}   {c3:8.2f} ± {half[2]:6.2f}"
+            )
+        lines.append(f"± is half a 95 % interval; noise {self.scale:.2f} times the stated one")
+        lines += [f"note: bubble {n}: {note}" for n, fit in self.fits.items() for note in fit.notes]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fits as plain numbers with units in their names, for JSON."""
+        return {
+            "bubbles": {str(number): fit.as_dict() for number, fit in self.fits.items()},
+            "mean_pa": list(self.mean),
+            "spread_pa2": self.spread.tolist(),
+        }
+
+
+def fit_measurements(
+    measurements: Measurements,
+    *,
+    pooled: bool = False,
+    height_sd: float = HEIGHT_SD,
+    pressure_sd: float = PRESSURE_SD,
+    **options: Any,
+) -> YeohFit | SheetFit:
+    """Fit what a file holds: one bubble (or all ``pooled`` as one) as such, several as a sheet.
+
+    Noise given in the file goes before ``height_sd`` and ``pressure_sd``; ``options`` are those of
+    :func:`fit_yeoh`.
+    """
+    m = measurements
+    noise: dict[str, Any] = {
+        "height_sd": height_sd if m.height_sd is None else m.height_sd,
+        "pressure_sd": pressure_sd if m.pressure_sd is None else m.pressure_sd,
+    }
+    if len(m.bubbles) > 1 and not pooled:
+        return fit_sheet(m.bubble, m.height, m.pressure, **noise, **options)
+    # Steps of different bubbles are different settings.
+    step = None if m.step is None else m.step + m.bubble * (int(m.step.max()) + 1)
+    return fit_yeoh(m.height, m.pressure, step=step, **noise, **options)
 
 
 def fit_sheet(

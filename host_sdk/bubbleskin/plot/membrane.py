@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -141,6 +142,14 @@ def figure_6(*, seed: int = 6) -> tuple[Figure, Measurements]:
     return plot_fit(fit, measurements, title=title), measurements
 
 
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a picture in the format that the ending of ``path`` names (png, svg, pdf)."""
+    try:
+        figure.savefig(path)
+    except (OSError, ValueError) as error:
+        raise InvalidInput(f"cannot write the picture {path}: {error}.") from None
+
+
 def draw_curve(
     axes: Axes, balloon: YeohBalloon, *, up_to_mm: float, colour: str, label: str = "", thin: bool = False
 ) -> None:
@@ -210,6 +219,8 @@ def _draw_plateau(axes: Axes, fit: YeohFit, measurements: Measurements) -> None:
     inset.set_xlim(ends.min() - 0.3, ends.max() + 0.3)
     inset.set_ylim(low * 1e3, high * 1e3)
     inset.tick_params(labelsize=7, length=2)
+    for spine in inset.spines.values():
+        spine.set(visible=True, color="#888888")
     axes.indicate_inset_zoom(inset, edgecolor="#888888")
 
 

@@ -1,0 +1,280 @@
+"""The verbs about the membrane: fit, table, plot."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from bubbleskin.errors import InvalidInput
+
+if TYPE_CHECKING:  # physics and plot load scipy and matplotlib, so a verb imports them when it runs
+    from bubbleskin.physics import Calibration, Measurements, SheetFit, YeohBalloon, YeohFit
+
+F = TypeVar("F", bound=Callable[..., Any])
+DATA = click.Path(dir_okay=False, path_type=Path)
+
+
+def _options(*options: Callable[[F], F]) -> Callable[[F], F]:
+    def decorate(function: F) -> F:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+size_options = _options(
+    click.option("--wall", type=click.Choice(["thin", "thick"]), default="thin", show_default=True),
+    click.option("--thickness-mm", type=float, default=1.0, show_default=True, help="Wall at rest."),
+    click.option("--diameter-mm", type=float, default=5.0, show_default=True, help="Diameter at rest."),
+    click.option(
+        "--diameter-is",
+        type=click.Choice(["mid", "inner", "outer"]),
+        default="mid",
+        show_default=True,
+        help="The surface of a thick wall that has this diameter.",
+    ),
+)
+fit_options = _options(
+    size_options,
+    click.option("--height-noise-mm", type=float, default=0.05, show_default=True, help="One sigma."),
+    click.option("--pressure-noise-kpa", type=float, default=0.15, show_default=True, help="One sigma."),
+    click.option("--pooled", is_flag=True, help="One curve through all bubbles of the file."),
+    click.option("--skip-bad-rows", is_flag=True, help="Leave bad rows out and name them."),
+)
+material_options = _options(
+    click.option("--preset", default="paper", show_default=True, help="paper, ecoflex-00-30, ..."),
+    click.option("--mu-kpa", type=float, help="Shear modulus, instead of the preset's."),
+    click.option("--c1-kpa", type=float, help="C1 = mu / 2, the other way to give it."),
+    click.option("--c2-pa", type=float, help="Instead of the preset's."),
+    click.option("--c3-pa", type=float, help="Instead of the preset's."),
+    size_options,
+)
+table_options = _options(
+    click.option("--board", default="wristband7", show_default=True, help="Name kept in the file."),
+    click.option("--knots", type=int, default=64, show_default=True, help="Knots per table, 64 at most."),
+    click.option("--up-to-mm", type=float, default=14.0, show_default=True, help="Where the tables end."),
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+
+
+def picture_option(name: str) -> Callable[[F], F]:
+    """The option that says where a picture goes."""
+    return click.option(
+        "-o", "--output", type=DATA, default=f"{name}.png", show_default=True, help="png, svg or pdf."
+    )
+
+
+@click.command()
+@click.argument("data", type=DATA)
+@fit_options
+@table_options
+@click.option("-o", "--output", type=DATA, help="Write the bubbles' tables as a calibration file.")
+@click.option("--picture", type=DATA, help="Draw the fit.")
+@json_option
+def fit(
+    data: Path, board: str, knots: int, up_to_mm: float, output: Path | None, picture: Path | None,
+    as_json: bool, **options: Any,
+) -> None:  # fmt: skip
+    """Fit the membrane's constants to DATA, a CSV file with units in its header.
+
+    Columns: height [mm], pressure [kPa]; also bubble and step (rows of one step are repeats).
+    """
+    measurements, found = _fit(data, **options)
+    click.echo(json.dumps(found.as_dict(), indent=2) if as_json else found.report())
+    if output:
+        _calibration(found, f"fit of {measurements.source}", board, knots, up_to_mm).save(output)
+        click.echo(f"wrote {output}", err=True)
+    if picture:
+        _draw_fit(found, measurements, picture)
+
+
+@click.command()
+@material_options
+@table_options
+@click.option("--data", type=DATA, help="Fit this CSV file first and make a table per bubble.")
+@click.option("--show", type=DATA, help="Read a calibration file instead of making one.")
+@click.option("--compare", type=DATA, help="Say how this other calibration file differs; status 1 if so.")
+@click.option("--bubbles", type=int, default=7, show_default=True, help="How many equal tables to make.")
+@click.option("-o", "--output", type=DATA, help="Write a calibration file.")
+@json_option
+def table(
+    board: str, knots: int, up_to_mm: float, data: Path | None, show: Path | None, compare: Path | None,
+    bubbles: int, output: Path | None, as_json: bool, preset: str, **options: Any,
+) -> None:  # fmt: skip
+    """Make the tables that the firmware runs on: height to pressure, one per bubble."""
+    from bubbleskin.physics import Calibration
+
+    if show:
+        calibration = Calibration.load(show)
+    elif data:
+        sizes = {key: options[key] for key in ("wall", "thickness_mm", "diameter_mm", "diameter_is")}
+        measurements, found = _fit(data, **sizes)
+        calibration = _calibration(found, f"fit of {measurements.source}", board, knots, up_to_mm)
+    else:
+        balloons = [_balloon(preset, **options)] * bubbles
+        calibration = _calibration(
+            balloons, balloons[0].describe() if balloons else "", board, knots, up_to_mm
+        )
+    click.echo(json.dumps(calibration.as_dict(), indent=2) if as_json else calibration.report())
+    if output:
+        calibration.save(output)
+        click.echo(f"wrote {output}", err=True)
+    if compare:
+        differences = calibration.differences(Calibration.load(compare))
+        click.echo("\n".join(differences) or "no difference")
+        if differences:
+            raise SystemExit(1)
+
+
+@click.group()
+def plot() -> None:
+    """Draw the membrane: curve, fit, table, and the paper's figures 4 and 6."""
+
+
+@plot.command("curve")
+@material_options
+@click.option("--up-to-mm", type=float, default=14.0, show_default=True, help="Where the curve ends.")
+@picture_option("curve")
+def plot_curve(preset: str, up_to_mm: float, output: Path, **options: Any) -> None:
+    """Height against pressure: stable solid, unstable dashed, jumps marked."""
+    from bubbleskin.plot import membrane
+
+    balloon = _balloon(preset, **options)
+    name = f"μ = {balloon.mu / 1e3:.4g} kPa, {balloon.wall} wall"
+    membrane.save(membrane.plot_curve({name: balloon}, up_to_mm=up_to_mm), output)
+    click.echo(f"wrote {output}", err=True)
+
+
+@plot.command("fit")
+@click.argument("data", type=DATA)
+@fit_options
+@picture_option("fit")
+def plot_fit(data: Path, output: Path, **options: Any) -> None:
+    """The points of DATA with error bars, the fitted curves and their 95 % confidence band."""
+    measurements, found = _fit(data, **options)
+    _draw_fit(found, measurements, output)
+
+
+@plot.command("table")
+@click.argument("calibration", type=DATA)
+@click.option("--bubble", type=int, default=0, show_default=True)
+@picture_option("table")
+def plot_table(calibration: Path, bubble: int, output: Path) -> None:
+    """The knots of one bubble of the file CALIBRATION on their curve, with the error between them."""
+    from bubbleskin.physics import Calibration
+    from bubbleskin.plot import membrane
+
+    membrane.save(membrane.plot_table(Calibration.load(calibration).table(bubble)), output)
+    click.echo(f"wrote {output}", err=True)
+
+
+@plot.command("figure4")
+@click.option("--seed", type=int, default=4, show_default=True)
+@picture_option("figure4")
+def plot_figure_4(seed: int, output: Path) -> None:
+    """The paper's Fig. 4, height against pressure with the model, from simulated measurements."""
+    from bubbleskin.plot import membrane
+
+    membrane.save(membrane.figure_4(seed=seed)[0], output)
+    click.echo(f"wrote {output} (simulated measurements)", err=True)
+
+
+@plot.command("figure6")
+@click.option("--seed", type=int, default=6, show_default=True)
+@picture_option("figure6")
+def plot_figure_6(seed: int, output: Path) -> None:
+    """The paper's Fig. 6, how bubbles of one sheet differ, from simulated measurements."""
+    from bubbleskin.plot import membrane
+
+    membrane.save(membrane.figure_6(seed=seed)[0], output)
+    click.echo(f"wrote {output} (simulated measurements)", err=True)
+
+
+commands = [fit, table, plot]
+
+
+@contextmanager
+def _said() -> Iterator[None]:
+    """Say rows left out in one line each; the other warnings stand in the reports."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for warning in caught:
+        if warning.category.__name__ == "BadRowWarning":
+            click.echo(str(warning.message), err=True)
+
+
+def _fit(
+    data: Path,
+    *,
+    skip_bad_rows: bool = False,
+    pooled: bool = False,
+    height_noise_mm: float = 0.05,
+    pressure_noise_kpa: float = 0.15,
+    thickness_mm: float,
+    diameter_mm: float,
+    diameter_is: str,
+    wall: str,
+) -> tuple[Measurements, YeohFit | SheetFit]:
+    from bubbleskin.physics import fit_measurements, read_csv
+
+    with _said():
+        measurements = read_csv(data, skip_bad_rows=skip_bad_rows)
+        return measurements, fit_measurements(
+            measurements,
+            pooled=pooled,
+            height_sd=height_noise_mm * 1e-3,
+            pressure_sd=pressure_noise_kpa * 1e3,
+            thickness=thickness_mm * 1e-3,
+            radius=diameter_mm * 0.5e-3,
+            wall=wall,
+            surface=diameter_is,
+        )
+
+
+def _balloon(
+    name: str,
+    *,
+    mu_kpa: float | None,
+    c1_kpa: float | None,
+    c2_pa: float | None,
+    c3_pa: float | None,
+    **sizes: Any,
+) -> YeohBalloon:
+    from bubbleskin.physics import YeohBalloon, preset
+
+    known = preset(name)
+    if mu_kpa is None and c1_kpa is None:
+        mu_kpa = known.mu / 1e3
+    return YeohBalloon.with_units(
+        mu_kpa=mu_kpa,
+        c1_kpa=c1_kpa,
+        c2_pa=known.c2 if c2_pa is None else c2_pa,
+        c3_pa=known.c3 if c3_pa is None else c3_pa,
+        **sizes,
+    )
+
+
+def _calibration(
+    found: YeohFit | SheetFit | list[YeohBalloon], source: str, board: str, knots: int, up_to_mm: float
+) -> Calibration:
+    from bubbleskin.physics import Calibration
+
+    balloons = found if isinstance(found, list) else found.balloons
+    if not balloons:
+        raise InvalidInput("--bubbles must be 1 or more.")
+    return Calibration.build(board, balloons, source=source, height_mm=(5.0, up_to_mm), knots=knots)
+
+
+def _draw_fit(found: YeohFit | SheetFit, measurements: Measurements, output: Path) -> None:
+    from bubbleskin.plot import membrane
+
+    membrane.save(membrane.plot_fit(found, measurements), output)
+    click.echo(f"wrote {output}", err=True)
