@@ -1,1 +1,1 @@
-"""."""
+"""Pictures of membranes, shapes and moves."""

@@ -1,0 +1,37 @@
+"""How fast simulated wristbands run: virtual seconds per second of one core."""
+
+import time
+
+import numpy as np
+
+from bubbleskin.bench.rows import Row
+from bubbleskin.sim.board import SimulatedBoard
+from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.link.session import drive
+from bubbleskin.sim.transport import SimulatedTransport
+
+_VIRTUAL = 20.0  # seconds
+_EVERY = 2.0  # seconds between two shows
+
+
+def rows() -> list[Row]:
+    """The firmware in process, with a new random shape every 2 s, and at rest."""
+    return [
+        _run("sim://wristband7, a new shape every 2 s", "wristband7", moving=True, target="≥ 20"),
+        _run("sim://wristband7, at rest", "wristband7", moving=False, target=""),
+        _run("sim://wristband19, a new shape every 2 s", "wristband19", moving=True, target=""),
+    ]
+
+
+def _run(name: str, board_name: str, *, moving: bool, target: str) -> Row:
+    board = SimulatedBoard(board_name, seed=1)
+    skin = Skin(drive(AsyncSkin.open(SimulatedTransport(board, board_name), 2.0)))
+    rng = np.random.default_rng(1)
+    skin.sleep(0.5)  # compiled, cached and warm
+    begin, cpu = board.time, time.process_time()
+    while board.time - begin < _VIRTUAL:
+        if moving:
+            skin.show(rng.uniform(5.5, 12.5, len(skin.layout)), wait=False)
+        skin.sleep(_EVERY)
+    spent = time.process_time() - cpu
+    return Row(name, (board.time - begin) / spent, "× real time", target)

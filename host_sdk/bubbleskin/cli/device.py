@@ -1,0 +1,158 @@
+"""Verbs that talk to a wristband: demo, info, show, monitor."""
+
+import dataclasses
+import json as jsonlib
+from pathlib import Path
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from bubbleskin.cli.options import as_json, device
+from bubbleskin.connect import connect
+from bubbleskin.errors import DeviceFault, InvalidInput
+from bubbleskin.records import State
+from bubbleskin.shape import shapes
+from bubbleskin.shape.heightfield import Heights
+from bubbleskin.skin import Skin
+
+
+@click.command()
+@click.option("--device", envvar="BUBBLESKIN_DEVICE", metavar="URL", default="sim://wristband7", show_default=True, show_envvar=True)
+@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), default="demo.png", show_default=True, help="The picture.")
+def demo(device: str, output: Path) -> None:
+    """Show a dome, then a tilted plane; print heights asked and reached; save a picture."""
+    from bubbleskin.plot.array import draw_shows
+
+    console = Console()
+    shows = []
+    with connect(device) as skin:
+        console.print(f"{device}: {skin.info.board}, {skin.info.bubbles} bubbles, firmware {skin.info.firmware}", highlight=False)
+        for title, heights in (("dome", shapes.dome(skin.layout)), ("tilted plane", shapes.plane(skin.layout))):
+            states = _watch(skin, heights, title, console)
+            console.print(_reached(states[-1], skin, title))
+            shows.append((title, states))
+        skin.vent()
+        limits = (skin.info.height_rest_mm, skin.info.height_max_mm)
+        picture = draw_shows(output, skin.layout, shows, limits)
+    console.print(f"The picture is [bold]{picture}[/bold]: the array from above, from the side, and height over time.", highlight=False)
+
+
+def _watch(skin: Skin, heights: Heights, title: str, console: Console, seconds: float = 1.0) -> list[State]:
+    """Show, and return the states of the second after it, with progress."""
+    states = [skin.state()]
+    skin.show(heights, wait=False)
+    bar = Progress(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[off]}"), TimeElapsedColumn(), console=console, transient=True)
+    with bar:
+        task = bar.add_task(f"{title} …", total=seconds, off="")
+        for state in skin.telemetry(50):
+            states.append(state)
+            worst = np.abs(state.height_mm - state.target_mm).max()
+            bar.update(task, completed=state.time - states[0].time, off=f"{worst:5.2f} mm to go")
+            if state.time - states[0].time >= seconds:
+                break
+    if not states[-1].settled:
+        raise DeviceFault(f"The {title} has not settled within {seconds:g} s: run `bubbleskin info` and look at the supply pressure and faults.")
+    return states
+
+
+def _reached(state: State, skin: Skin, title: str) -> Table:
+    simulated = skin.simulated
+    table = Table("bubble", "asked (mm)", "reached (mm)", title=title, title_justify="left")
+    if simulated:
+        table.add_column("true (mm)")
+    table.add_column("pressure (kPa)")
+    for bubble in range(skin.info.bubbles):
+        row = [str(bubble), f"{state.target_mm[bubble]:.2f}", f"{state.height_mm[bubble]:.2f}"]
+        if simulated:
+            row.append(f"{simulated.height_mm[bubble]:.2f}")
+        table.add_row(*row, f"{state.pressure_kpa[bubble]:.2f}")
+    return table
+
+
+@click.command()
+@device
+@as_json
+def info(device: str | None, json: bool) -> None:
+    """Say who the wristband is and how it does."""
+    with connect(device) as skin:
+        facts = dataclasses.asdict(skin.info) | dataclasses.asdict(skin.health()) | {"faults": skin.faults()}
+    if json:
+        click.echo(jsonlib.dumps(facts, indent=2))
+        return
+    table = Table(show_header=False, box=None)
+    units = {"tick": " s", "time": " s", "tick_worst": " s", "heap_free": " bytes", "supply_kpa": ""}
+    for name, value in facts.items():
+        if name in ("tables_crc", "boot_id"):
+            value = f"{value:08x}"
+        table.add_row(name.replace("_", " "), f"{value}{units.get(name, '')}")
+    Console().print(table)
+
+
+@click.command(context_settings={"ignore_unknown_options": True})
+@click.argument("heights", nargs=-1, metavar="[MM]...")
+@click.option("--all", "everywhere", type=float, metavar="MM", help="The same height for every bubble.")
+@click.option("--shape", type=click.Choice(list(shapes.SHAPES)), help="A ready-made shape.")
+@click.option("--file", "path", type=click.Path(dir_okay=False, path_type=Path), help="A heightfield: .npy, or numbers in .csv.")
+@click.option("--over", type=float, default=0.0, show_default=True, help="Seconds the change should take.")
+@device
+@as_json
+def show(
+    heights: tuple[str, ...], everywhere: float | None, shape: str | None, path: Path | None, over: float, device: str | None, json: bool
+) -> None:
+    """Take a shape: one height in MM per bubble, or one of --all, --shape, --file."""
+    given = [bool(heights), everywhere is not None, shape is not None, path is not None]
+    if sum(given) != 1:
+        raise InvalidInput("Say the shape in one way: a height in mm per bubble, or one of --all, --shape and --file.")
+    asked: Heights
+    if path is not None:
+        asked = shapes.load(path)
+    elif everywhere is None:
+        asked = shapes.numbers(heights)
+    with connect(device) as skin:
+        if shape:
+            asked = shapes.SHAPES[shape](skin.layout)
+        elif everywhere is not None:
+            asked = np.full(skin.info.bubbles, everywhere)
+        state = skin.show(asked, over=over)
+        assert state is not None
+        if json:
+            columns = {"target_mm": state.target_mm, "height_mm": state.height_mm, "pressure_kpa": state.pressure_kpa}
+            click.echo(jsonlib.dumps({name: column.tolist() for name, column in columns.items()}))
+        else:
+            Console().print(_reached(state, skin, f"settled at {state.time:.2f} s"))
+
+
+@click.command()
+@click.option("--rate", type=float, default=20.0, show_default=True, help="Times a second.")
+@click.option("--seconds", type=float, help="End after so many seconds of device time; without it, at Ctrl-C.")
+@device
+@as_json
+def monitor(rate: float, seconds: float | None, device: str | None, json: bool) -> None:
+    """Watch heights, pressures and faults live; with --json, a line for each state."""
+    with connect(device) as skin:
+        begin = None
+        with Live(console=Console(), auto_refresh=False) as live:
+            for state in skin.telemetry(rate):
+                begin = state.time if begin is None else begin
+                if json:
+                    click.echo(jsonlib.dumps(dataclasses.asdict(state), default=lambda array: array.tolist()))
+                else:
+                    live.update(_live(state), refresh=True)
+                if seconds is not None and state.time - begin >= seconds:
+                    break
+
+
+def _live(state: State) -> Table:
+    table = Table("bubble", "target (mm)", "height (mm)", "", "pressure (kPa)", "status", "faults", title=f"{state.mode}, {state.time:.2f} s")
+    for bubble, height in enumerate(state.height_mm):
+        bar = "█" * round(max(height - 5, 0) * 2)
+        status, faults = state.status[bubble], ", ".join(state.faults[bubble])
+        table.add_row(str(bubble), f"{state.target_mm[bubble]:.2f}", f"{height:.2f}", f"{bar:<18}", f"{state.pressure_kpa[bubble]:.2f}", status, faults)
+    return table
+
+
+commands = [demo, info, show, monitor]

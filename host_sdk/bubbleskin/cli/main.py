@@ -1,0 +1,50 @@
+"""The command itself: its verbs, and how errors become one line and an exit status."""
+
+import sys
+from typing import Any
+
+import click
+
+from bubbleskin.cli import bench, device, sim
+from bubbleskin.errors import BubbleskinError, InvalidInput
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="bubbleskin")
+def bubbleskin() -> None:
+    """Heights in, shapes out: wristbands of inflatable bubbles, real and simulated."""
+
+
+for _command in (*device.commands, *sim.commands, *bench.commands):
+    bubbleskin.add_command(_command)
+
+
+def main(arguments: list[str] | None = None) -> Any:
+    """Run the command. A user's mistake is one line and exit status 2, a device's failure 1, no tracebacks."""
+    try:
+        status = bubbleskin.main(arguments, prog_name="bubbleskin", standalone_mode=False)
+        sys.exit(status if isinstance(status, int) else 0)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        sys.exit(2)
+    except click.ClickException as error:
+        _end(f"{error.format_message()} See `{_path(error)} --help`.", 2)
+    except (click.Abort, KeyboardInterrupt):
+        _end("Stopped.", 130)
+    except InvalidInput as error:
+        _end(str(error), 2)
+    except BubbleskinError as error:
+        _end(str(error), 1)
+    except BrokenPipeError:  # whoever read our output has gone
+        sys.stderr.close()
+        sys.exit(1)
+
+
+def _end(sentence: str, status: int) -> None:
+    click.echo(" ".join(sentence.split()), err=True)
+    sys.exit(status)
+
+
+def _path(error: click.ClickException) -> str:
+    context = getattr(error, "ctx", None)
+    return context.command_path if context else "bubbleskin"

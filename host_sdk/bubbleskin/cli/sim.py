@@ -1,0 +1,41 @@
+"""`bubbleskin sim`: serve a simulated wristband to other programs."""
+
+import click
+from rich.console import Console
+
+from bubbleskin.cli.options import as_json
+
+
+@click.command()
+@click.argument("board", default="wristband7")
+@click.option("--port", type=int, help="Serve on this TCP port of this machine (0: a free one) instead of a pseudo-terminal.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of sensor noise and spread.")
+@click.option("--spread", type=float, default=0.0, show_default=True, help="How much parts differ: 0.1 for ± 10 %.")
+@click.option("--micropython", is_flag=True, help="Run the firmware in a real MicroPython.")
+@as_json
+def sim(board: str, port: int | None, seed: int, spread: float, micropython: bool, json: bool) -> None:
+    """Serve a simulated BOARD (wristband7, wristband19) in real time, until Ctrl-C.
+
+    Any program can open it with pyserial: at the pseudo-terminal or the socket:// URL that is printed.
+    """
+    from bubbleskin.sim import open_board
+    from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve
+
+    scheme = "micropython" if micropython else "sim"
+    transport, simulated = open_board(scheme, board, {"seed": str(seed), "spread": str(spread)})
+    try:
+        end = PtyEnd() if port is None else TcpEnd(port)
+        try:
+            if json:
+                click.echo(f'{{"device": "{end.name}", "board": "{board}"}}')
+            else:
+                Console().print(f"{board} is served at [bold]{end.name}[/bold]. Ctrl-C ends it.", highlight=False)
+            for _ in serve(simulated, end):
+                pass
+        finally:
+            end.close()
+    finally:
+        transport.close()
+
+
+commands = [sim]
