@@ -89,6 +89,8 @@ _SURPRISE_UM = const(500)  # further off than metering ever is,
 _SURPRISE_PA = const(500)  # by more than noise: believe the sensor afresh
 _INTEGRAL_MAX = const(1 << 17)
 _ROW_MIN = const(2)  # readings in a row that make a fault: one alone is noise
+_STEP_MAX = const(16000)  # 1/16 µm: 1 mm, far more than one period moves a bubble
+_NEAR = const(320)  # 1/16 µm: 20 µm, so near to the height last weighed its tangent is good to 0.1 µm
 _STEEP_MAX = const(60000)  # Pa/mm
 _SIZE_MAX = const(50000)  # µJ, more than any period brings
 _SLOPE_MIN = const(256)
@@ -152,7 +154,7 @@ def estimate(rows, board, counts, knots):
                 rise = knot[found + 3] - knot[found + 1]
                 if rise != 0:
                     measured += (p - knot[found + 1]) * (knot[found + 2] - knot[found]) // rise
-            off = measured - (s[at + _HEIGHT] >> 4)
+            off = measured - (s[at + _HEIGHT + _WEIGHED] >> 4)
             trust = s[at + _TRUST] + 1
             if open_vent:
                 trust = 0
@@ -169,38 +171,44 @@ def estimate(rows, board, counts, knots):
         if air > _AIR_MAX:
             air = _AIR_MAX
         s[at + _AIR] = air
-        # One Newton step a tick from the last height: what is left of it comes with the next.
+        # The height that this air means, along the tangent at the height last weighed.
         step = (air - s[at + _HEIGHT + _CONTENT] << 12) // slope
-        if step > 16000:
-            step = 16000
-        if step < -16000:
-            step = -16000
-        s[at + _HEIGHT] = s[at + _HEIGHT] + step
+        if step > _STEP_MAX:
+            step = _STEP_MAX
+        if step < 0 - _STEP_MAX:
+            step = 0 - _STEP_MAX
+        s[at + _HEIGHT] = s[at + _HEIGHT + _WEIGHED] + step
         i += 1
         at += _ROW
 
 
 @micropython.viper
 def weigh(rows, board, knots):
-    """Pressure, air and air per height of every estimate and setpoint, by the bubble's table."""
+    """Move the setpoints on; then pressure, air and air per height of every estimate and setpoint, by the bubble's table.
+
+    An estimate is weighed again when it has left the neighbourhood of where it was weighed last.
+    """
     s = ptr32(rows)
     k = ptr32(board)
     knot = ptr16(knots)
     n = k[_N]
     dead = k[_DEAD_VOLUME]
+    moving = 0
     if k[_RAMP_DONE] < k[_RAMP_TICKS]:
         k[_RAMP_DONE] = k[_RAMP_DONE] + 1
+        moving = 1
     i = 0
     row = 0
     while i < n:
-        reach = s[row + _TARGET] - s[row + _START]
-        setpoint = s[row + _START] + reach * k[_RAMP_DONE] // k[_RAMP_TICKS]
-        s[row + _SETPOINT] = setpoint << 4
-        begin = i * k[_KNOT_STRIDE]
-        end = begin + 2 * (s[row + _KNOTS] - 1)
+        if moving:
+            reach = s[row + _TARGET] - s[row + _START]
+            s[row + _SETPOINT] = (s[row + _START] + reach * k[_RAMP_DONE] // k[_RAMP_TICKS]) << 4
         at = row + _HEIGHT
         while at <= row + _SETPOINT:
-            if s[at] != s[at + _WEIGHED]:
+            off = s[at] - s[at + _WEIGHED]
+            if off > _NEAR or off < 0 - _NEAR or (at != row + _HEIGHT and off != 0):
+                begin = i * k[_KNOT_STRIDE]
+                end = begin + 2 * (s[row + _KNOTS] - 1)
                 if s[at] < knot[begin] << 4:
                     s[at] = knot[begin] << 4
                 if s[at] > knot[end] << 4:
@@ -467,6 +475,9 @@ class Bubbles:
             at = i * _ROW
             row[at + _START] = row[at + _HEIGHT] >> 4
             row[at + _TARGET] = values[first + i]
+        self._ramp(ticks)
+
+    def _ramp(self, ticks):
         self._board[_RAMP_DONE] = 0
         self._board[_RAMP_TICKS] = ticks
 
@@ -476,14 +487,14 @@ class Bubbles:
         for i in range(self.count):
             at = i * _ROW
             row[at + _START] = row[at + _TARGET] = row[at + _HEIGHT] >> 4
-        self._board[_RAMP_DONE] = self._board[_RAMP_TICKS]
+        self._ramp(1)
 
     def rest(self):
         """No bubble is wanted higher than it is without pressure."""
         row = self._rows
         for at in range(0, self.count * _ROW, _ROW):
             row[at + _START] = row[at + _TARGET] = self._board[_REST_UM]
-        self._board[_RAMP_DONE] = self._board[_RAMP_TICKS]
+        self._ramp(1)
 
     def clear_faults(self):
         """Forget all faults; what still is wrong faults again."""

@@ -12,6 +12,7 @@ class Supply:
         self.pump = 0
         self.dump = False
         self._board = board
+        self._first = True
 
     def sense(self, count):
         """Take one reading of the supply sensor. A sensor at the end of its range stops the pump."""
@@ -20,6 +21,9 @@ class Supply:
             self.pump = 0
             return
         pressure = (count - board.SUPPLY_ZERO) * board.SUPPLY_PA_PER_COUNT
+        if self._first:
+            self._first = False
+            self.pressure_pa = pressure
         self.pressure_pa += (pressure - self.pressure_pa) // 4  # four readings average the noise away
         duty = (board.SUPPLY_PA + _HEADROOM_PA - self.pressure_pa) * _DUTY_PER_PA
         self.pump = 0 if duty < 0 else 65535 if duty > 65535 else duty

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Self
 
@@ -53,7 +54,7 @@ class Layout:
         corners = [np.array([np.cos(a), np.sin(a)]) for a in np.deg2rad(np.arange(0, 420, 60))]
         places = [np.zeros(2)]
         for ring in range(1, rings + 1):
-            for here, there in zip(corners[:-1], corners[1:], strict=True):
+            for here, there in pairwise(corners):
                 places += [ring * here + step * (there - here) for step in range(ring)]
         return cls(np.round(np.array(places) * pitch_mm, 6), pitch_mm)
 

@@ -93,7 +93,9 @@ class AsyncSkin:
         """See `Skin.telemetry`."""
         highest = 1 / self.info.tick
         if not 0 < rate_hz <= highest:
-            raise InvalidInput(f"rate_hz is {rate_hz}; telemetry comes more than 0 and up to {highest:g} times a second.")
+            raise InvalidInput(
+                f"rate_hz is {rate_hz}; telemetry comes more than 0 and up to {highest:g} times a second."
+            )
         period = max(1, round(highest / rate_hz))
         link = self._link
         link.telemetry.clear()

@@ -186,7 +186,13 @@ MESSAGES = (
         (),
         "check the tables received and use them from the next tick",
     ),
-    (TABLE_COMMIT | REPLY, "TABLE_COMMIT_REPLY", (("tables_crc", U32, "", None, None, "of the tables in use"),), (), "tables in use"),
+    (
+        TABLE_COMMIT | REPLY,
+        "TABLE_COMMIT_REPLY",
+        (("tables_crc", U32, "", None, None, "of the tables in use"),),
+        (),
+        "tables in use",
+    ),
     (
         TABLE_READ,
         "TABLE_READ",

@@ -16,7 +16,7 @@ try:
 
     def heap_free():
         """Free bytes of the garbage collected heap."""
-        return gc.mem_free()
+        return gc.mem_free()  # type: ignore[attr-defined]
 
 except ImportError:
 

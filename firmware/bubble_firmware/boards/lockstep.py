@@ -35,7 +35,7 @@ class Hands:
             self._stdout.write(out)
             self._sent = 0
         self._ticked = True
-        return self._stdin.readinto(self._in) == len(self._in)
+        return self._stdin.readinto(self._in) == len(self._in)  # type: ignore[union-attr]
 
     def sense(self, counts):
         """Fill in the counts of this tick."""

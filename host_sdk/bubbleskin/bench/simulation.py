@@ -5,10 +5,10 @@ import time
 import numpy as np
 
 from bubbleskin.bench.rows import Row
-from bubbleskin.sim.board import SimulatedBoard
-from bubbleskin.skin import AsyncSkin, Skin
 from bubbleskin.link.session import drive
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.transport import SimulatedTransport
+from bubbleskin.skin import AsyncSkin, Skin
 
 _VIRTUAL = 20.0  # seconds
 _EVERY = 2.0  # seconds between two shows

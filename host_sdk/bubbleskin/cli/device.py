@@ -21,8 +21,21 @@ from bubbleskin.skin import Skin
 
 
 @click.command()
-@click.option("--device", envvar="BUBBLESKIN_DEVICE", metavar="URL", default="sim://wristband7", show_default=True, show_envvar=True)
-@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), default="demo.png", show_default=True, help="The picture.")
+@click.option(
+    "--device",
+    envvar="BUBBLESKIN_DEVICE",
+    metavar="URL",
+    default="sim://wristband7",
+    show_default=True,
+    show_envvar=True,
+)
+@click.option(
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default="demo.png",
+    show_default=True,
+    help="The picture.",
+)
 def demo(device: str, output: Path) -> None:
     """Show a dome, then a tilted plane; print heights asked and reached; save a picture."""
     from bubbleskin.plot.array import draw_shows
@@ -30,7 +43,9 @@ def demo(device: str, output: Path) -> None:
     console = Console()
     shows = []
     with connect(device) as skin:
-        console.print(f"{device}: {skin.info.board}, {skin.info.bubbles} bubbles, firmware {skin.info.firmware}", highlight=False)
+        console.print(
+            f"{device}: {skin.info.board}, {skin.info.bubbles} bubbles, firmware {skin.info.firmware}", highlight=False
+        )
         for title, heights in (("dome", shapes.dome(skin.layout)), ("tilted plane", shapes.plane(skin.layout))):
             states = _watch(skin, heights, title, console)
             console.print(_reached(states[-1], skin, title))
@@ -38,14 +53,24 @@ def demo(device: str, output: Path) -> None:
         skin.vent()
         limits = (skin.info.height_rest_mm, skin.info.height_max_mm)
         picture = draw_shows(output, skin.layout, shows, limits)
-    console.print(f"The picture is [bold]{picture}[/bold]: the array from above, from the side, and height over time.", highlight=False)
+    console.print(
+        f"The picture is [bold]{picture}[/bold]: the array from above, from the side, and height over time.",
+        highlight=False,
+    )
 
 
 def _watch(skin: Skin, heights: Heights, title: str, console: Console, seconds: float = 1.0) -> list[State]:
     """Show, and return the states of the second after it, with progress."""
     states = [skin.state()]
     skin.show(heights, wait=False)
-    bar = Progress(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[off]}"), TimeElapsedColumn(), console=console, transient=True)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[off]}"),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+    )
     with bar:
         task = bar.add_task(f"{title} …", total=seconds, off="")
         for state in skin.telemetry(50):
@@ -55,7 +80,9 @@ def _watch(skin: Skin, heights: Heights, title: str, console: Console, seconds: 
             if state.time - states[0].time >= seconds:
                 break
     if not states[-1].settled:
-        raise DeviceFault(f"The {title} has not settled within {seconds:g} s: run `bubbleskin info` and look at the supply pressure and faults.")
+        raise DeviceFault(
+            f"The {title} has not settled within {seconds:g} s: run `bubbleskin info` and look at the supply pressure and faults."
+        )
     return states
 
 
@@ -96,12 +123,20 @@ def info(device: str | None, json: bool) -> None:
 @click.argument("heights", nargs=-1, metavar="[MM]...")
 @click.option("--all", "everywhere", type=float, metavar="MM", help="The same height for every bubble.")
 @click.option("--shape", type=click.Choice(list(shapes.SHAPES)), help="A ready-made shape.")
-@click.option("--file", "path", type=click.Path(dir_okay=False, path_type=Path), help="A heightfield: .npy, or numbers in .csv.")
+@click.option(
+    "--file", "path", type=click.Path(dir_okay=False, path_type=Path), help="A heightfield: .npy, or numbers in .csv."
+)
 @click.option("--over", type=float, default=0.0, show_default=True, help="Seconds the change should take.")
 @device
 @as_json
 def show(
-    heights: tuple[str, ...], everywhere: float | None, shape: str | None, path: Path | None, over: float, device: str | None, json: bool
+    heights: tuple[str, ...],
+    everywhere: float | None,
+    shape: str | None,
+    path: Path | None,
+    over: float,
+    device: str | None,
+    json: bool,
 ) -> None:
     """Take a shape: one height in MM per bubble, or one of --all, --shape, --file."""
     given = [bool(heights), everywhere is not None, shape is not None, path is not None]
@@ -147,11 +182,28 @@ def monitor(rate: float, seconds: float | None, device: str | None, json: bool) 
 
 
 def _live(state: State) -> Table:
-    table = Table("bubble", "target (mm)", "height (mm)", "", "pressure (kPa)", "status", "faults", title=f"{state.mode}, {state.time:.2f} s")
+    table = Table(
+        "bubble",
+        "target (mm)",
+        "height (mm)",
+        "",
+        "pressure (kPa)",
+        "status",
+        "faults",
+        title=f"{state.mode}, {state.time:.2f} s",
+    )
     for bubble, height in enumerate(state.height_mm):
         bar = "█" * round(max(height - 5, 0) * 2)
         status, faults = state.status[bubble], ", ".join(state.faults[bubble])
-        table.add_row(str(bubble), f"{state.target_mm[bubble]:.2f}", f"{height:.2f}", f"{bar:<18}", f"{state.pressure_kpa[bubble]:.2f}", status, faults)
+        table.add_row(
+            str(bubble),
+            f"{state.target_mm[bubble]:.2f}",
+            f"{height:.2f}",
+            f"{bar:<18}",
+            f"{state.pressure_kpa[bubble]:.2f}",
+            status,
+            faults,
+        )
     return table
 
 

@@ -8,7 +8,9 @@ from bubbleskin.cli.options import as_json
 
 @click.command()
 @click.argument("board", default="wristband7")
-@click.option("--port", type=int, help="Serve on this TCP port of this machine (0: a free one) instead of a pseudo-terminal.")
+@click.option(
+    "--port", type=int, help="Serve on this TCP port of this machine (0: a free one) instead of a pseudo-terminal."
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of sensor noise and spread.")
 @click.option("--spread", type=float, default=0.0, show_default=True, help="How much parts differ: 0.1 for ± 10 %.")
 @click.option("--micropython", is_flag=True, help="Run the firmware in a real MicroPython.")

@@ -3,7 +3,7 @@
 import contextlib
 import errno
 import time
-from typing import Protocol
+from typing import Any, Protocol
 
 import serial
 from serial.tools import list_ports
@@ -37,7 +37,7 @@ class SerialTransport:
 
     def __init__(self, url: str):
         self.name = url
-        exclusive = {"exclusive": True} if "://" not in url else {}
+        exclusive: dict[str, Any] = {"exclusive": True} if "://" not in url else {}
         try:
             self._port = serial.serial_for_url(url, baudrate=115200, timeout=0, write_timeout=2.0, **exclusive)
         except ValueError as error:
@@ -55,16 +55,22 @@ class SerialTransport:
             self._port.timeout = 0
             return bytes(first + self._port.read(4096))
         except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed under our feet
-            raise LinkError(f"The connection to {self.name} is lost ({error}). Check the cable and connect again.") from None
+            raise LinkError(
+                f"The connection to {self.name} is lost ({error}). Check the cable and connect again."
+            ) from None
 
     def write(self, data: bytes) -> None:
         """Send all of `data`."""
         try:
             self._port.write(data)
         except serial.SerialTimeoutException:
-            raise LinkError(f"{self.name} takes no data. It may hang: unplug it, plug it in and connect again.") from None
+            raise LinkError(
+                f"{self.name} takes no data. It may hang: unplug it, plug it in and connect again."
+            ) from None
         except (serial.SerialException, OSError) as error:
-            raise LinkError(f"The connection to {self.name} is lost ({error}). Check the cable and connect again.") from None
+            raise LinkError(
+                f"The connection to {self.name} is lost ({error}). Check the cable and connect again."
+            ) from None
 
     def now(self) -> float:
         """The wall clock's seconds."""

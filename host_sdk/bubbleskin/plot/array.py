@@ -45,7 +45,9 @@ def _above(axes, layout, state, colours):  # type: ignore[no-untyped-def]
         red, green, blue, _ = colours.to_rgba(height)
         axes.add_patch(Circle((x, y), min(height, layout.pitch_mm) / 2, color=(red, green, blue)))
         dark = 0.3 * red + 0.6 * green + 0.1 * blue < 0.5
-        axes.text(x, y, f"{bubble}\n{height:.2f}", ha="center", va="center", color="white" if dark else "black", fontsize=8)
+        axes.text(
+            x, y, f"{bubble}\n{height:.2f}", ha="center", va="center", color="white" if dark else "black", fontsize=8
+        )
     reach = np.abs(layout.positions_mm).max() + 0.75 * layout.pitch_mm
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
 
@@ -55,9 +57,13 @@ def _side(axes, layout, state, colours, top):  # type: ignore[no-untyped-def]
     for bubble in np.argsort(-layout.positions_mm[:, 1]):
         x = layout.positions_mm[bubble, 0]
         height = state.height_mm[bubble]
-        axes.add_patch(Circle((x, height / 2), height / 2, facecolor=colours.to_rgba(height), edgecolor="white", lw=1.2))
+        axes.add_patch(
+            Circle((x, height / 2), height / 2, facecolor=colours.to_rgba(height), edgecolor="white", lw=1.2)
+        )
     for bubble, x in enumerate(layout.positions_mm[:, 0]):
-        axes.hlines(state.target_mm[bubble], x - 2, x + 2, color="tab:red", lw=1.5, label="asked" if bubble == 0 else None)
+        axes.hlines(
+            state.target_mm[bubble], x - 2, x + 2, color="tab:red", lw=1.5, label="asked" if bubble == 0 else None
+        )
     reach = np.abs(layout.positions_mm[:, 0]).max() + 0.75 * layout.pitch_mm
     axes.axhline(0, color="black", lw=1)
     axes.set(xlim=(-reach, reach), ylim=(0, 1.15 * top), aspect="equal", xlabel="x (mm)", ylabel="height (mm)")
@@ -74,4 +80,11 @@ def _over_time(axes, layout, states):  # type: ignore[no-untyped-def]
         axes.plot(time, targets[:, bubble], color=line.get_color(), lw=0.8, ls="--")
     axes.set(xlabel="time (s)", ylabel="height (mm)", xlim=(0, time[-1]))
     axes.grid(alpha=0.3)
-    axes.legend(title="bubble", frameon=False, fontsize=8, ncols=2 if len(layout) > 9 else 1, loc="center left", bbox_to_anchor=(1, 0.5))
+    axes.legend(
+        title="bubble",
+        frameon=False,
+        fontsize=8,
+        ncols=2 if len(layout) > 9 else 1,
+        loc="center left",
+        bbox_to_anchor=(1, 0.5),
+    )

@@ -31,7 +31,8 @@ def sample(heights_mm: Heights, layout: Layout, height_max_mm: float) -> NDArray
     if heights.shape != (len(layout),):
         shape = f"{len(heights)} heights" if heights.ndim == 1 else f"an array of shape {heights.shape}"
         raise InvalidInput(
-            f"{shape[0].upper() + shape[1:]} for {len(layout)} bubbles: give one height in mm per bubble, a 2-D heightfield or f(x_mm, y_mm)."
+            f"{shape[0].upper() + shape[1:]} for {len(layout)} bubbles: "
+            "give one height in mm per bubble, a 2-D heightfield or f(x_mm, y_mm)."
         )
     for wrong, what in (
         (~np.isfinite(heights), "is not a number"),
@@ -71,4 +72,6 @@ def _interpolate(field: NDArray[np.float64], layout: Layout) -> NDArray[np.float
     span = layout.positions_mm.max(axis=0) - low
     share = (layout.positions_mm - low) / np.where(span > 0, span, 1)
     rows, columns = field.shape
-    return np.asarray(map_coordinates(field, [share[:, 1] * (rows - 1), share[:, 0] * (columns - 1)], order=1, mode="nearest"))
+    return np.asarray(
+        map_coordinates(field, [share[:, 1] * (rows - 1), share[:, 0] * (columns - 1)], order=1, mode="nearest")
+    )

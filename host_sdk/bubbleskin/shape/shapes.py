@@ -46,10 +46,7 @@ def numbers(words: Sequence[str]) -> NDArray[np.float64]:
 def load(path: Path) -> NDArray[np.float64]:
     """A heightfield in mm from a .npy file, or from a text file of numbers with commas between them."""
     try:
-        if path.suffix == ".npy":
-            field = np.load(path, allow_pickle=False)
-        else:
-            field = np.loadtxt(path, delimiter=",")
+        field = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.loadtxt(path, delimiter=",")
         return np.asarray(field, dtype=float)
     except OSError as error:
         raise InvalidInput(f"Cannot read {path}: {error.strerror or error}.") from None

@@ -174,4 +174,4 @@ def load_board(name: str) -> ModuleType:
     """The data of a board that can be simulated."""
     if name not in BOARDS:
         raise InvalidInput(f"There is no board {name!r} to simulate; there are {' and '.join(BOARDS)}.")
-    return boards.load(name)  # type: ignore[no-any-return]
+    return boards.load(name)

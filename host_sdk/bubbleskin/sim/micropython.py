@@ -13,8 +13,8 @@ import bubble_firmware
 import bubble_protocol
 from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT
 from bubbleskin.errors import LinkError
-from bubbleskin.sim.board import Outputs
 from bubbleskin.interpreter import find_micropython
+from bubbleskin.sim.board import Outputs
 
 HEAP = "190k"
 """As much as is free for the firmware on a Pico, or less."""

@@ -37,9 +37,7 @@ class Plant:
     sensors' noise. Attributes: `parameters`, and `time` in s since the start.
     """
 
-    def __init__(
-        self, parameters: PlantParameters, seed: int = 0, supply_pa: float = 60e3, substep: float = SUBSTEP
-    ):
+    def __init__(self, parameters: PlantParameters, seed: int = 0, supply_pa: float = 60e3, substep: float = SUBSTEP):
         n = len(parameters.mu)
         self.parameters = parameters
         self.time = 0.0
@@ -56,9 +54,7 @@ class Plant:
         self._noise = np.zeros(n)
         self._rng = np.random.default_rng(seed)
 
-    def advance(
-        self, dt: float, fill_on: ArrayLike, vent_on: ArrayLike, pump: float = 0.0, dump: bool = False
-    ) -> None:
+    def advance(self, dt: float, fill_on: ArrayLike, vent_on: ArrayLike, pump: float = 0.0, dump: bool = False) -> None:
         """Let `dt` seconds pass.
 
         `fill_on` and `vent_on` are (n,) seconds within [0, dt] for which each valve's coil is energised from

@@ -57,7 +57,9 @@ class TcpEnd:
             self._listener.bind(("127.0.0.1", port))
         except OSError as error:
             self._listener.close()
-            raise LinkError(f"Port {port} cannot be served ({error.strerror}); choose another, or 0 for a free one.") from None
+            raise LinkError(
+                f"Port {port} cannot be served ({error.strerror}); choose another, or 0 for a free one."
+            ) from None
         self._listener.listen(1)
         self._client: socket.socket | None = None
         self.name = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"

@@ -1,0 +1,54 @@
+# make demo: see it. make test: every check that needs no hardware. make check: the everyday ones, under a minute.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+GENERATORS := nominal_table golden_vectors protocol_page cli_page draw_membrane_figures
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test check lint generated micropython bench generate clean
+
+help: ## what can be made
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+setup: $(READY) ## the virtual environment .venv with the bubbleskin command
+
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("bubbleskin needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.12")'
+	@echo "setting up $(VENV): a minute or two, once"
+	@$(PYTHON) -m venv $(VENV) || { echo "Python cannot make virtual environments here; on Debian: apt-get install python3-venv"; exit 1; }
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
+	@$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable . --group dev
+	@touch $@
+
+demo: setup ## a simulated wristband takes two shapes; ends with a picture
+	$(BIN)/bubbleskin demo
+
+test: setup lint generated micropython ## every check that needs no hardware
+	$(BIN)/python -m pytest -n 2
+
+check: setup lint ## the everyday checks, under a minute
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+lint: setup
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache | grep -v '^[╔╚║╝╠═ ]'
+
+generated: setup ## fail if a generated file is out of date
+	@for tool in $(GENERATORS); do $(BIN)/python tools/$$tool.py --check || exit 1; done; echo "generated files are up to date"
+
+generate: setup ## write all generated files
+	@for tool in $(GENERATORS); do $(BIN)/python tools/$$tool.py || exit 1; done
+
+micropython: setup ## build the real MicroPython that the tests run on, once
+	$(BIN)/python tools/build_micropython.py
+
+bench: setup ## measure speeds
+	$(BIN)/bubbleskin bench
+
+clean: ## remove what setup and tests made here
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find protocol firmware host_sdk tools tests hil_tests -name __pycache__ -type d -prune -exec rm -rf {} +
