@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-GENERATORS := nominal_table golden_vectors protocol_page cli_page draw_membrane_figures
+GENERATORS := nominal_table golden_vectors protocol_page cli_page draw_demo draw_membrane_figures
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test check lint generated micropython bench generate clean

@@ -8,12 +8,13 @@ import click
 import numpy as np
 from rich.console import Console
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bubbleskin.cli.options import as_json, device
 from bubbleskin.connect import connect
-from bubbleskin.errors import DeviceFault, InvalidInput
+from bubbleskin.demo import DEMO, SECONDS, Show, watch
+from bubbleskin.errors import InvalidInput
 from bubbleskin.records import State
 from bubbleskin.shape import shapes
 from bubbleskin.shape.heightfield import Heights
@@ -41,49 +42,33 @@ def demo(device: str, output: Path) -> None:
     from bubbleskin.plot.array import draw_shows
 
     console = Console()
-    shows = []
+    shows: list[Show] = []
     with connect(device) as skin:
-        console.print(
-            f"{device}: {skin.info.board}, {skin.info.bubbles} bubbles, firmware {skin.info.firmware}", highlight=False
-        )
-        for title, heights in (("dome", shapes.dome(skin.layout)), ("tilted plane", shapes.plane(skin.layout))):
-            states = _watch(skin, heights, title, console)
-            console.print(_reached(states[-1], skin, title))
-            shows.append((title, states))
+        info = skin.info
+        console.print(f"{device}: {info.board}, {info.bubbles} bubbles, firmware {info.firmware}", highlight=False)
+        for title, shape in DEMO.items():
+            with _progress(console) as bar:
+                task = bar.add_task(f"{title} …", total=SECONDS, off="")
+
+                def report(state: State, since: float, bar: Progress = bar, task: TaskID = task) -> None:
+                    worst = np.abs(state.height_mm - state.target_mm).max()
+                    bar.update(task, completed=since, off=f"{worst:5.2f} mm to go")
+
+                show = watch(skin, title, shape(skin.layout), report)
+            console.print(_reached(show.states[-1], skin, title))
+            shows.append(show)
         skin.vent()
-        limits = (skin.info.height_rest_mm, skin.info.height_max_mm)
-        picture = draw_shows(output, skin.layout, shows, limits)
+        picture = draw_shows(output, skin.layout, shows, (info.height_rest_mm, info.height_max_mm))
     console.print(
         f"The picture is [bold]{picture}[/bold]: the array from above, from the side, and height over time.",
         highlight=False,
+        soft_wrap=True,
     )
 
 
-def _watch(skin: Skin, heights: Heights, title: str, console: Console, seconds: float = 1.0) -> list[State]:
-    """Show, and return the states of the second after it, with progress."""
-    states = [skin.state()]
-    skin.show(heights, wait=False)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[off]}"),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-    )
-    with bar:
-        task = bar.add_task(f"{title} …", total=seconds, off="")
-        for state in skin.telemetry(50):
-            states.append(state)
-            worst = np.abs(state.height_mm - state.target_mm).max()
-            bar.update(task, completed=state.time - states[0].time, off=f"{worst:5.2f} mm to go")
-            if state.time - states[0].time >= seconds:
-                break
-    if not states[-1].settled:
-        raise DeviceFault(
-            f"The {title} has not settled within {seconds:g} s: run `bubbleskin info` and look at the supply pressure and faults."
-        )
-    return states
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[off]}"), TimeElapsedColumn())
+    return Progress(*columns, console=console, transient=True)
 
 
 def _reached(state: State, skin: Skin, title: str) -> Table:
@@ -193,13 +178,13 @@ def _live(state: State) -> Table:
         title=f"{state.mode}, {state.time:.2f} s",
     )
     for bubble, height in enumerate(state.height_mm):
-        bar = "█" * round(max(height - 5, 0) * 2)
+        bar = "█" * round(height)  # one block per mm
         status, faults = state.status[bubble], ", ".join(state.faults[bubble])
         table.add_row(
             str(bubble),
             f"{state.target_mm[bubble]:.2f}",
             f"{height:.2f}",
-            f"{bar:<18}",
+            f"{bar:<14}",
             f"{state.pressure_kpa[bubble]:.2f}",
             status,
             faults,

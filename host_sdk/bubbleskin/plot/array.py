@@ -10,18 +10,16 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from bubbleskin.demo import Show
 from bubbleskin.layout import Layout
-from bubbleskin.records import State
 
 _COLOURS = "viridis"
 
 
-def draw_shows(
-    path: str | Path, layout: Layout, shows: Sequence[tuple[str, Sequence[State]]], limits_mm: tuple[float, float]
-) -> Path:
+def draw_shows(path: str | Path, layout: Layout, shows: Sequence[Show], limits_mm: tuple[float, float]) -> Path:
     """One picture of several shows, a row each: the array from above, from the side, and height over time.
 
-    `shows`: (title, states in order of time); the last state is the shape that is drawn. `limits_mm`: heights
+    The last state of each show is the shape that is drawn. `limits_mm`: heights
     of the colour scale. Returns the file's path.
     """
     figure = Figure(figsize=(13, 3.6 * len(shows)), layout="constrained")

@@ -1,0 +1,47 @@
+"""The demonstration: a few shapes in a row, and how the bubbles got there."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.errors import DeviceFault
+from bubbleskin.layout import Layout
+from bubbleskin.records import State
+from bubbleskin.shape import shapes
+from bubbleskin.skin import Skin
+
+DEMO: dict[str, Callable[[Layout], NDArray[np.float64]]] = {"dome": shapes.dome, "tilted plane": shapes.plane}
+
+SECONDS = 1.0
+"""How long each shape is watched; it stands after about half of that."""
+
+_RATE_HZ = 50
+
+
+class Show(NamedTuple):
+    """One shape: its title and the states from the command to `SECONDS` later."""
+
+    title: str
+    states: list[State]
+
+
+def watch(skin: Skin, title: str, heights_mm: NDArray[np.float64], report: Callable[[State, float], None]) -> Show:
+    """Show `heights_mm` and collect the states; `report` gets each with the seconds since the command.
+
+    Raises `DeviceFault` where the shape does not stand at the end.
+    """
+    states = [skin.state()]
+    skin.show(heights_mm, wait=False)
+    for state in skin.telemetry(_RATE_HZ):
+        states.append(state)
+        since = state.time - states[0].time
+        report(state, since)
+        if since >= SECONDS:
+            break
+    if not states[-1].settled:
+        raise DeviceFault(
+            f"The {title} does not stand after {SECONDS:g} s. Run `bubbleskin info` and look at supply pressure and faults."
+        )
+    return Show(title, states)
