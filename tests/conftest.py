@@ -1,0 +1,49 @@
+"""What all tests share: the real MicroPython, and how hypothesis looks for counterexamples."""
+
+import os
+import subprocess
+from textwrap import dedent
+
+import pytest
+from hypothesis import settings
+
+from bubbleskin.errors import BubbleskinError
+from bubbleskin.interpreter import find_micropython
+from bubbleskin.sim.micropython import HEAP, source_path
+
+# The same examples on every run, and no deadline: a busy machine is not a failure.
+settings.register_profile("house", deadline=None, derandomize=True)
+settings.load_profile("house")
+
+
+@pytest.fixture(scope="session")
+def micropython(tmp_path_factory):
+    """`run(script, stdin="", timeout=60)`: what a script prints in the real MicroPython, with the board's heap.
+
+    The script finds `bubble_protocol` and `bubble_firmware`. Where it fails, the test fails with what it said.
+    """
+    try:
+        interpreter = find_micropython()
+    except BubbleskinError as problem:
+        if os.environ.get("CI"):
+            pytest.fail(str(problem))
+        pytest.skip(str(problem))
+    folder = tmp_path_factory.mktemp("micropython")
+
+    def run(script: str, stdin: str = "", timeout: float = 60.0) -> str:
+        path = folder / "script.py"
+        # All on the first line, so that line numbers in a traceback are the script's plus one.
+        path.write_text(f"import sys; sys.path[:] = {source_path()!r}\n{dedent(script).lstrip()}", encoding="utf-8")
+        done = subprocess.run(
+            [interpreter, "-X", f"heapsize={HEAP}", path],
+            input=stdin,
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+            check=False,
+        )
+        if done.returncode:
+            pytest.fail(f"MicroPython ended with status {done.returncode}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+        return done.stdout
+
+    return run

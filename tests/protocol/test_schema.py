@@ -1,0 +1,133 @@
+"""The schema is data: what everyone who reads it relies on."""
+
+import pytest
+
+from bubble_firmware import boards, session
+from bubble_protocol import codec, messages
+from bubble_protocol.framing import PAYLOAD_MAX
+from bubble_protocol.messages import I32, MESSAGES, REPLY, TEXT, U8, U16, U32
+from bubbleskin.link import wire
+from bubbleskin.sim.board import BOARDS
+
+RANGES = {U8: (0, 0xFF), U16: (0, 0xFFFF), U32: (0, 0xFFFFFFFF), I32: (-(1 << 31), (1 << 31) - 1)}
+UNASKED = {messages.TELEMETRY, messages.ERROR}
+BUBBLES = 24  # the largest board a frame has room for
+
+FIELDS = [
+    pytest.param(message, field, id=f"{message[1]}.{field[0]}")
+    for message in MESSAGES
+    for field in (*message[2], *message[3])
+]
+
+
+def requests():
+    return [message for message in MESSAGES if message[0] < REPLY and message[0] not in UNASKED]
+
+
+def test_ids_and_names_are_unique():
+    assert len({message[0] for message in MESSAGES}) == len({message[1] for message in MESSAGES}) == len(MESSAGES)
+    assert all(0 < message[0] <= 0xFF for message in MESSAGES)
+    assert len(codec.BY_ID) == len(codec.BY_NAME) == len(MESSAGES)
+
+
+def test_every_request_has_its_reply_and_every_reply_its_request():
+    names = {message[0]: message[1] for message in MESSAGES}
+    for message_id, name, *_ in requests():
+        assert names[message_id | REPLY] == name + "_REPLY"
+    assert {message[0] for message in MESSAGES if message[0] & REPLY} == {message[0] | REPLY for message in requests()}
+
+
+def test_names_of_ids_are_the_names_of_the_messages():
+    for message_id, name, *_ in MESSAGES:
+        if not message_id & REPLY:
+            assert getattr(messages, name) == message_id
+
+
+@pytest.mark.parametrize(("message", "field"), FIELDS)
+def test_a_field_is_sound(message, field):
+    name, kind, unit, low, high, meaning = field
+    assert name.isidentifier()
+    assert name == name.lower()
+    assert kind in messages.KIND_NAMES
+    assert isinstance(meaning, str)
+    for suffix, meant in (("_um", "µm"), ("_pa", "Pa"), ("_us", "µs"), ("_ms", "ms"), ("ticks", "ticks")):
+        assert not name.endswith(suffix) or unit == meant
+    if kind == TEXT:
+        assert (low, high) == (None, None)
+        assert field in message[2], "a text is not repeated"
+        assert message[0] & REPLY, "the firmware's limits count one value per field: no text in a request"
+    else:
+        lowest, highest = RANGES[kind]
+        assert lowest <= (lowest if low is None else low) <= (highest if high is None else high) <= highest
+    if kind == U32:
+        assert (low or 0, high) == (0, None), "the firmware compares limits as signed words"
+
+
+def test_names_of_fields_are_unique_in_a_message():
+    for _, _, fixed, group, meaning in MESSAGES:
+        names = [field[0] for field in (*fixed, *group)]
+        assert len(set(names)) == len(names)
+        assert meaning
+
+
+@pytest.mark.parametrize(
+    ("name", "entries"),
+    [
+        ("SHOW", BUBBLES),
+        ("STATE_REPLY", BUBBLES),
+        ("TELEMETRY", BUBBLES),
+        ("TABLE_WRITE", 48),
+        ("TABLE_READ_REPLY", 48),
+    ],
+)
+def test_a_frame_has_room_for_every_bubble(name, entries):
+    message = codec.BY_NAME[name]
+    assert message.fixed_size + entries * message.stride <= PAYLOAD_MAX
+    assert max(boards.load(board).BUBBLES for board in BOARDS) <= BUBBLES
+    assert session._KNOTS_PER_MESSAGE == 48
+
+
+def test_every_message_fits_a_frame():
+    for message in codec.BY_ID.values():
+        assert message.fixed_size + message.stride <= PAYLOAD_MAX
+
+
+def test_telemetry_is_an_unasked_state():
+    assert codec.BY_NAME["TELEMETRY"].fixed == codec.BY_NAME["STATE_REPLY"].fixed
+    assert codec.BY_NAME["TELEMETRY"].repeated == codec.BY_NAME["STATE_REPLY"].repeated
+
+
+@pytest.mark.parametrize(
+    "table", [messages.ERRORS, messages.MODES, messages.STATUSES], ids=["errors", "modes", "statuses"]
+)
+def test_an_enumeration_counts_on(table):
+    first = table[0][0]
+    assert first in (0, 1)
+    assert [entry[0] for entry in table] == list(range(first, first + len(table)))
+    assert len({entry[1] for entry in table}) == len(table)
+    for number, name, meaning in table:
+        assert getattr(messages, name.upper()) == number
+        assert meaning
+
+
+def test_faults_are_bits_of_a_byte():
+    assert [fault[0] for fault in messages.FAULTS] == [1 << bit for bit in range(len(messages.FAULTS))]
+    assert messages.FAULTS[-1][0] <= 0x80
+    for bit, name, _ in messages.FAULTS:
+        assert getattr(messages, name.upper()) == bit
+
+
+def test_every_error_of_the_schema_can_be_explained():
+    for number, name, _ in messages.ERRORS:
+        values = {
+            "request": messages.SHOW,
+            "error": number,
+            "field": 1,
+            "element": 3,
+            "asked": 15000,
+            "low": 0,
+            "high": 14000,
+        }
+        sentence = wire.explain(wire.Received(messages.ERROR, 0, values, {}))
+        # Another protocol is the session's to explain; everything else has a sentence of its own.
+        assert ("with error" in sentence) == (name == "no_common_protocol")
