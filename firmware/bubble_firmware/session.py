@@ -134,7 +134,7 @@ class Session:
         values[27] = board.PRESSURE_MAX_PA
         values[28] = 1  # one request at a time
         values[29] = 0
-        values[30] = self._app.tables.crc[0]
+        values[30] = self._app.tables.crc
         self._reply(0)
 
     def _ping(self, count):
@@ -154,7 +154,7 @@ class Session:
         values[6] = self.telemetry_dropped
         values[7] = heap_free()
         values[8] = app.supply.pressure_pa
-        values[9] = app.tables.crc[0]
+        values[9] = app.tables.crc
         values[10] = app.mode
         self._reply(0)
 
@@ -207,7 +207,7 @@ class Session:
         else:
             tables.swap()
             app.bubbles.use_tables()
-            self._values[0] = tables.crc[0]
+            self._values[0] = tables.crc
             self._reply(0)
 
     def _table_read(self, count):

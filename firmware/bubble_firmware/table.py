@@ -40,7 +40,7 @@ class Tables:
         self.bubbles = bubbles
         self.knots = bytearray(bubbles * KNOTS_MAX * KNOT_BYTES)
         self.sizes = array("i", bytearray(4 * bubbles))
-        self.crc = array("i", bytearray(4))  # one value; an array so that reading it allocates nothing
+        self.crc = 0  # made once by `swap`: handing on an integer, however long, allocates nothing
         self._received = bytearray(len(self.knots))
         self._received_sizes = array("i", bytearray(4 * bubbles))
         for bubble in range(bubbles):
@@ -99,6 +99,6 @@ class Tables:
 
     def swap(self):
         """Use the received set; what is received next starts from a copy of it."""
-        self.crc[0] = self.received_crc()
+        self.crc = self.received_crc()
         self.knots[:] = self._received
         self.sizes[:] = self._received_sizes
