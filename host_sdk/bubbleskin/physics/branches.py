@@ -35,9 +35,7 @@ def turning_points(slope: Function, low: float, high: float) -> list[float]:
     x = np.sort(np.concatenate([x, bottoms]))
     s = slope(x)
     crossings = np.flatnonzero(np.sign(s[:-1]) * np.sign(s[1:]) < 0)
-    return [
-        float(brentq(lambda v: float(slope(v)), x[i], x[i + 1], xtol=1e-15, rtol=1e-15)) for i in crossings
-    ]
+    return [float(brentq(lambda v: float(slope(v)), x[i], x[i + 1], xtol=1e-15, rtol=1e-15)) for i in crossings]
 
 
 class Piece(NamedTuple):

@@ -212,9 +212,7 @@ def _table(bubble: dict[str, Any]) -> Table:
     balloon = None
     if all(key in bubble for key in CONSTANTS):
         mu, c2, c3, thickness, radius, wall, surface = (bubble[key] for key in CONSTANTS)
-        balloon = YeohBalloon(
-            mu=mu, c2=c2, c3=c3, thickness=thickness, radius=radius, wall=wall, surface=surface
-        )
+        balloon = YeohBalloon(mu=mu, c2=c2, c3=c3, thickness=thickness, radius=radius, wall=wall, surface=surface)
     return Table(knots[:, 0], knots[:, 1], balloon)
 
 

@@ -141,9 +141,7 @@ def _heading(path: Path, cells: list[str]) -> list[tuple[str, float] | None]:
     columns: list[tuple[str, float] | None] = []
     for cell in (cell.strip().strip('"') for cell in cells):
         match = _HEADING.match(cell.replace(" sd", "_sd"))
-        name, unit = (
-            (match["name"].lower(), match["unit"] or match["tail"]) if match else (cell.lower(), None)
-        )
+        name, unit = (match["name"].lower(), match["unit"] or match["tail"]) if match else (cell.lower(), None)
         if unit == "sd":
             name, unit = f"{name}_sd", None
         if name in NUMBERED:
@@ -152,9 +150,7 @@ def _heading(path: Path, cells: list[str]) -> list[tuple[str, float] | None]:
             known = UNITS[name.removesuffix("_sd")]
             example = f"'{name} [{'mm' if name.startswith('height') else 'kPa'}]'"
             if unit is None:
-                raise InvalidInput(
-                    f"{path}: the column {cell!r} has no unit; write it in the header, as {example}."
-                )
+                raise InvalidInput(f"{path}: the column {cell!r} has no unit; write it in the header, as {example}.")
             if unit.lower() not in known or unit == "mPa":
                 raise InvalidInput(
                     f"{path}: {unit!r} in the column {cell!r} is no unit of {name.removesuffix('_sd')} known "

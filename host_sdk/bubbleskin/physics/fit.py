@@ -12,7 +12,7 @@ from scipy import stats
 from bubbleskin.errors import InvalidInput
 from bubbleskin.physics.balloon import Surface, Wall, YeohBalloon
 from bubbleskin.physics.checks import finite, like, positive
-from bubbleskin.physics.regression import Points, Shape, Solution, noise_variance, regress
+from bubbleskin.physics.regression import Points, Shape, Solution, regress
 
 HEIGHT_SD = 0.05e-3
 """Standard deviation (m) assumed of a height when none is given."""
@@ -57,7 +57,7 @@ class YeohFit:
 
     ``parameters`` (μ, C2, C3) in Pa and their ``covariance`` (3, 3); ``residuals`` (n,) in Pa, measured
     minus model at the measured height; ``distances`` (n,) from the curve in units of the noise that was
-    stated; ``weights`` (n,), 0 for an outlier to 1; ``scale``, the noise found in units of the noise
+    stated; ``outliers`` (n,), which points were left out; ``scale``, the noise found in units of the noise
     stated; ``dof`` degrees of freedom behind it; ``notes``, sentences about what not to trust.
     """
 
@@ -66,17 +66,12 @@ class YeohFit:
     covariance: np.ndarray
     residuals: np.ndarray
     distances: np.ndarray
-    weights: np.ndarray
+    outliers: np.ndarray
     scale: float
     dof: float
     repeats: Repeats | None = None
     notes: tuple[str, ...] = ()
     shape: Shape = field(repr=False, kw_only=True)
-
-    @property
-    def outliers(self) -> np.ndarray:
-        """Which points were as good as ignored, (n,) bool."""
-        return self.weights < 0.1
 
     @property
     def balloons(self) -> list[YeohBalloon]:
@@ -174,7 +169,8 @@ def fit_yeoh(
     The points may come from one bubble or, pooled, from many; :func:`fit_sheet` fits each by itself.
     ``radius``, ``thickness``, ``wall`` and ``surface`` are taken as given, as :class:`YeohBalloon` has them.
     Noise is in both axes; only the ratio of ``height_sd`` (m) to ``pressure_sd`` (Pa), scalars or (n,),
-    matters, for its size is found from the residuals. ``robust`` ignores outliers, C3 is kept ≥ 0.
+    matters, for its size is found from the residuals. ``robust`` leaves out points more than 4 standard
+    deviations off. C3 is kept ≥ 0.
 
     ``step`` (n,) names the setting of each point, and points of one setting are repeats (triplicates).
     If they agree with each other much better than with the model, the model is at fault, not the noise:
@@ -194,8 +190,8 @@ def fit_yeoh(
     solution = regress(shape, points, robust=robust)
     linear = solution.linear
     distances = linear.residuals(solution.theta)
-    variance = noise_variance(distances, solution.scale, robust=robust, fitted=3)
-    dof = float(len(points) - 3)
+    variance = solution.scale**2
+    dof = max(float(solution.weights.sum()) - 3.0, 1.0)
     notes: list[str] = []
     repeats = None
     if step is not None:
@@ -209,7 +205,7 @@ def fit_yeoh(
             )
             notes.append(note)
             warnings.warn(note, LackOfFitWarning, stacklevel=2)
-    covariance = variance * inverse(linear.design.T @ (linear.design * (solution.weights > 0)[:, None]))
+    covariance = variance * inverse(linear.design.T @ (linear.design * solution.weights[:, None]))
     fit = finish(shape, points, solution.theta, covariance, distances, solution, dof, repeats, tuple(notes))
     condition = float(np.linalg.cond(linear.design / np.linalg.norm(linear.design, axis=0)))
     doubt = open_constants(fit, points, condition)
@@ -266,7 +262,7 @@ def finish(
         covariance,
         residuals,
         distances,
-        solution.weights,
+        solution.weights == 0,
         solution.scale,
         dof,
         repeats,
@@ -287,7 +283,7 @@ def _repeats(
     """Noise between repeats, and the variance of the settings' means about the curve per repeat."""
     if step.shape != distances.shape:
         raise InvalidInput(f"step must name the setting of each of the {distances.size} points.")
-    kept = solution.weights >= 0.1
+    kept = solution.weights > 0
     _, group = np.unique(step[kept], return_inverse=True)
     count = np.bincount(group)
     inner = int(kept.sum() - count.size)
@@ -325,9 +321,7 @@ def open_constants(fit: YeohFit, points: Points, condition: float = 0.0) -> str:
         missing.append(f"below {1.3 * rest:.1f} mm")
     if highest < 2.1 * rest:
         missing.append(f"above {2.1 * rest:.1f} mm")
-    advice = (
-        f"Measure {' and '.join(missing)} as well, off the plateau." if missing else "Measure more points."
-    )
+    advice = f"Measure {' and '.join(missing)} as well, off the plateau." if missing else "Measure more points."
     names = ", ".join(f"{name} by {h:.3g} Pa" for name, h in zip(("mu", "C2", "C3"), half, strict=True))
     return (
         f"the heights measured ({lowest:.1f} to {highest:.1f} mm) do not "

@@ -18,8 +18,9 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.physics import wall as walls
 from bubbleskin.physics.balloon import Surface, Wall, YeohBalloon, yeoh_pressure
 
-BISQUARE = 4.685  # Tukey's constant: 95 % efficiency on clean Gaussian noise
-HUBER = 1.345
+HUBER = 1.345  # standard deviations; these two give 95 % efficiency on clean Gaussian noise
+BISQUARE = 4.685
+CUT = 4.0  # standard deviations from the curve that make an outlier: one good point in 16000 is lost
 PASSES = 60
 TOLERANCE = 1e-7  # relative change of θ at which the passes end
 
@@ -123,9 +124,7 @@ def project(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) ->
     for _ in range(3):
         basis, slopes = shape.basis(eta)
         P, dP = (basis * theta).sum(axis=1), (slopes * theta).sum(axis=1)
-        gradient = (eta - points.height) / points.height_sd**2 + (
-            P - points.pressure
-        ) * dP / points.pressure_sd**2
+        gradient = (eta - points.height) / points.height_sd**2 + (P - points.pressure) * dP / points.pressure_sd**2
         curvature = 1 / points.height_sd**2 + (dP / points.pressure_sd) ** 2
         step = np.clip(gradient / curvature, -0.1 * shape.rest_height, 0.1 * shape.rest_height)
         eta = np.maximum(eta - step, low)
@@ -176,13 +175,24 @@ def bisquare(u: np.ndarray) -> np.ndarray:
     return np.clip(1 - (u / BISQUARE) ** 2, 0, None) ** 2
 
 
-def regress(shape: Shape, points: Points, *, robust: bool, theta: np.ndarray | None = None) -> Solution:
-    """Fit θ to ``points``: Huber's weights to get near, then bisquare ones with the scale held."""
-    theta = start(shape, points) if theta is None else theta
-    eta = points.height
-    weights = np.ones(len(points))
-    scale = 1.0
-    for stage in ("huber", "bisquare") if robust else ("plain",):
+def within(residuals: np.ndarray, scale: float) -> np.ndarray:
+    """1 for points within :data:`CUT` standard deviations, 0 for outliers; at least 4 are kept."""
+    kept = np.abs(residuals) <= CUT * scale
+    if kept.sum() < 4:
+        kept[np.argsort(np.abs(residuals))[:4]] = True
+    return kept.astype(float)
+
+
+def kept_scale(residuals: np.ndarray, weights: np.ndarray, fitted: float = 3) -> float:
+    """Standard deviation of the points that ``weights`` keeps, for that many constants fitted."""
+    return max(float(np.sqrt(np.sum(weights * residuals**2) / max(np.sum(weights) - fitted, 1.0))), 1e-9)
+
+
+def regress(shape: Shape, points: Points, *, robust: bool) -> Solution:
+    """Fit θ to ``points``: near by Huber's weights, nearer by bisquare ones, then without the outliers."""
+    theta, eta = start(shape, points), points.height
+    weights, scale = np.ones(len(points)), 1.0
+    for stage in ("huber", "bisquare", "trim") if robust else ("plain",):
         for _ in range(PASSES):
             eta = project(shape, points, theta, eta)
             linear = linearise(shape, points, theta, eta)
@@ -192,31 +202,14 @@ def regress(shape: Shape, points: Points, *, robust: bool, theta: np.ndarray | N
                 weights = huber(residuals / scale)
             elif stage == "bisquare":
                 weights = bisquare(residuals / scale)
+            elif stage == "trim":
+                weights = within(residuals, scale)
+                scale = kept_scale(residuals, weights)
             new = solve_bounded(linear, weights)
             change = float(np.max(np.abs(new - theta) / (np.abs(new) + 1e-6 * new[0])))
             theta = new
-            if change < (1e-4 if stage == "huber" else TOLERANCE):
+            if change < (TOLERANCE if stage in ("plain", "trim") else 1e-3):
                 break
     eta = project(shape, points, theta, eta)
     linear = linearise(shape, points, theta, eta)
-    residuals = linear.residuals(theta)
-    if not robust:
-        scale = float(np.sqrt(np.sum(residuals**2) / max(len(points) - 3, 1)))
-    return Solution(theta, linear, weights, scale)
-
-
-def noise_variance(residuals: np.ndarray, scale: float, *, robust: bool, fitted: float) -> float:
-    """What multiplies (XᵀX)⁻¹ in the covariance, in units of the stated variance.
-
-    Plain: χ² over degrees of freedom. Robust: Huber's s² mean(ψ²) / mean(ψ')², corrected for the fitted
-    constants.
-    """
-    n = residuals.size
-    spare = max(n - fitted, 1.0)
-    if not robust:
-        return float(np.sum(residuals**2)) / spare
-    u = residuals / scale
-    psi = u * bisquare(u)
-    inside = np.clip(1 - (u / BISQUARE) ** 2, 0, None)
-    dpsi = inside * (1 - 5 * (u / BISQUARE) ** 2)
-    return float(scale**2 * (np.sum(psi**2) / spare) / max(float(np.mean(dpsi)), 0.1) ** 2)
+    return Solution(theta, linear, weights, kept_scale(linear.residuals(theta), weights))

@@ -38,9 +38,10 @@ from bubbleskin.physics.regression import (
     bisquare,
     huber,
     linearise,
-    noise_variance,
+    median_scale,
     project,
     start,
+    within,
 )
 
 STIFFNESS_SPREAD = 0.10
@@ -159,13 +160,9 @@ def fit_sheet(
     points = as_points(height, pressure, height_sd, pressure_sd)
     number = np.asarray(bubble)
     if number.shape != points.height.shape:
-        raise InvalidInput(
-            f"bubble must number each of the {len(points)} points; it has {number.size} entries."
-        )
+        raise InvalidInput(f"bubble must number each of the {len(points)} points; it has {number.size} entries.")
     if len(points) < LEAST_POINTS:
-        raise InvalidInput(
-            f"{len(points)} points on the whole sheet are too few: give at least {LEAST_POINTS}."
-        )
+        raise InvalidInput(f"{len(points)} points on the whole sheet are too few: give at least {LEAST_POINTS}.")
     shape.balloon(start(shape, points))  # refuses impossible sizes and pressures
     numbers, index = np.unique(number, return_inverse=True)
     sheet = _Sheet(shape, points, index, robust=robust)
@@ -184,8 +181,7 @@ def fit_sheet(
     doubtful = [n for n, fit in fits.items() if fit.notes]
     if doubtful:
         warnings.warn(
-            f"bubble{'s' * (len(doubtful) > 1)} {', '.join(map(str, doubtful))}: "
-            f"{fits[doubtful[0]].notes[0]}",
+            f"bubble{'s' * (len(doubtful) > 1)} {', '.join(map(str, doubtful))}: {fits[doubtful[0]].notes[0]}",
             IdentifiabilityWarning,
             stacklevel=2,
         )
@@ -216,10 +212,10 @@ class _Sheet:
         for k in range(PASSES):
             before = self.phi
             self._see()
-            self._weigh(huber if k < 5 else bisquare)
+            self._weigh(huber if k < 5 else bisquare if k < 10 else None)
             self._each_bubble()
             self._whole_sheet()
-            if k > 8 and np.max(np.abs(self.phi - before)) < 1e-5:
+            if k > 12 and np.max(np.abs(self.phi - before)) < 1e-5:
                 break
         self._see()
 
@@ -230,38 +226,35 @@ class _Sheet:
         self.linear = Linear(linear.design * self.unit, linear.target)
         self.distances = self.linear.residuals(self.phi[self.index])
 
-    def _weigh(self, weigh: Callable[[np.ndarray], np.ndarray]) -> None:
+    def _weigh(self, weigh: Callable[[np.ndarray], np.ndarray] | None) -> None:
         # One noise for the sheet, since a bubble with few points could not tell its own; and the stated
         # noise counts as STATED points, since a sheet with few points could not either.
-        spare = max(self.distances.size - self.fitted, 1.0)
-        self.dof = STATED + spare
-        if self.robust:
-            found = (1.4826 * float(np.median(np.abs(self.distances)))) ** 2 * self.distances.size
-            self.scale = float(np.sqrt((STATED + found) / self.dof))
-            self.weights = weigh(self.distances / self.scale)
-        else:
-            self.scale = float(np.sqrt((STATED + np.sum(self.distances**2)) / self.dof))
-        found = noise_variance(self.distances, self.scale, robust=self.robust, fitted=self.fitted)
-        self.variance = (STATED + spare * found) / self.dof
+        r = self.distances
+        if self.robust and weigh is not None:
+            self.scale = float(np.sqrt((STATED + r.size * median_scale(r, 0) ** 2) / (STATED + r.size)))
+            self.weights = weigh(r / self.scale)
+        elif self.robust:
+            self.weights = within(r, self.scale)
+        self.dof = STATED + max(float(self.weights.sum()) - self.fitted, 0.0)
+        if weigh is None or not self.robust:
+            self.scale = float(np.sqrt((STATED + np.sum(self.weights * r**2)) / self.dof))
 
     def _each_bubble(self) -> None:
         X, y = self.linear
         prior = np.linalg.inv(self.spread)
-        A = np.einsum("bn,ni,nj->bij", self.of * self.weights, X, X) / self.variance
-        b = np.einsum("bn,ni,n->bi", self.of * self.weights, X, y) / self.variance
+        A = np.einsum("bn,ni,nj->bij", self.of * self.weights, X, X) / self.scale**2
+        b = np.einsum("bn,ni,n->bi", self.of * self.weights, X, y) / self.scale**2
         self.phi = np.linalg.solve(A + prior, (b + prior @ self.mean)[:, :, None])[:, :, 0]
         for k in np.flatnonzero(self.phi[:, 2] < 0):
             self.phi[k] = _without_c3(A[k] + prior, b[k] + prior @ self.mean)
-        self.information = np.einsum("bn,ni,nj->bij", self.of * (self.weights > 0), X, X) / self.variance
+        self.information = A
         self.covariance = np.linalg.inv(self.information + prior)
         self.fitted = float(np.einsum("bij,bji->", self.covariance, self.information)) + 1e-9
 
     def _whole_sheet(self) -> None:
         weak = np.eye(3) / MEAN_SPREAD**2
         prior = np.linalg.inv(self.spread)
-        self.mean = np.linalg.solve(
-            self.count * prior + weak, prior @ self.phi.sum(axis=0) + weak @ np.ones(3)
-        )
+        self.mean = np.linalg.solve(self.count * prior + weak, prior @ self.phi.sum(axis=0) + weak @ np.ones(3))
         off = self.phi - self.mean
         scatter = off.T @ off + self.covariance.sum(axis=0)
         self.spread = (scatter + SUPPOSED * self.supposed) / (self.count + SUPPOSED)

@@ -157,9 +157,7 @@ class Table:
         return TableError(worst_p, worst_h, max(worst_p / PRESSURE_TOLERANCE, worst_h / HEIGHT_TOLERANCE))
 
 
-def build_table(
-    balloon: YeohBalloon, *, height_mm: tuple[float, float] = (5.0, 14.0), knots: int = MAX_KNOTS
-) -> Table:
+def build_table(balloon: YeohBalloon, *, height_mm: tuple[float, float] = (5.0, 14.0), knots: int = MAX_KNOTS) -> Table:
     """The table with ``knots`` knots that follows ``balloon`` best, from rest up to ``height_mm[1]``.
 
     The first knot is the rest height at 0 Pa; the bound of :meth:`Table.max_error` is taken over

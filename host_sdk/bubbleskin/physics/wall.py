@@ -26,9 +26,7 @@ def rest_radii(h0: float, r0: float, wall: str, surface: str) -> tuple[float, fl
     return r0 + inner * h0, r0 + outer * h0
 
 
-def current_radii(
-    x: np.ndarray, h0: float, r0: float, wall: str, surface: str
-) -> tuple[np.ndarray, np.ndarray]:
+def current_radii(x: np.ndarray, h0: float, r0: float, wall: str, surface: str) -> tuple[np.ndarray, np.ndarray]:
     """A and b, the inner and outer radius at stretch ``x`` of the named surface."""
     if wall == "thin":
         return r0 * x, r0 * x
@@ -51,9 +49,7 @@ def least_stretch(h0: float, r0: float, wall: str, surface: str) -> float:
     return 0.0 if wall == "thin" else float(np.cbrt(max(0.0, 1 - (A / r0) ** 3)))
 
 
-def radius_slope(
-    x: np.ndarray, h0: float, r0: float, wall: str, surface: str
-) -> tuple[np.ndarray, np.ndarray]:
+def radius_slope(x: np.ndarray, h0: float, r0: float, wall: str, surface: str) -> tuple[np.ndarray, np.ndarray]:
     """da/dλ and db/dλ, from a² da = s² ds = b² db."""
     a, b = current_radii(x, h0, r0, wall, surface)
     s2 = r0**3 * x * x
