@@ -1,0 +1,151 @@
+"""The command as its user meets it: what it prints, its exit statuses, one line for every mistake."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+import tty
+
+import pytest
+
+from bubbleskin.cli.main import main
+
+SIM = ["--device", "sim://wristband7"]
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Run the command; returns exit status, standard output and standard error."""
+    monkeypatch.delenv("BUBBLESKIN_DEVICE", raising=False)
+    monkeypatch.setenv("COLUMNS", "160")
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main(list(arguments))
+        out, err = capsys.readouterr()
+        return end.value.code, out, err
+
+    return run
+
+
+def assert_one_sentence(outcome, status, *words):
+    code, out, err = outcome
+    assert code == status, err
+    assert not out
+    assert err.count("\n") == 1
+    assert err.endswith(".\n")
+    assert "Traceback" not in err
+    for word in words:
+        assert word in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["show", "8", "9", *SIM], ["2 heights", "7 bubbles"]),
+        (["show", *["8"] * 6, "-3", *SIM], ["bubble 6", "negative", "14 mm"]),
+        (["show", *["8"] * 6, "nan", *SIM], ["bubble 6", "not a number"]),
+        (["show", *["8"] * 6, "15", *SIM], ["bubble 6", "above the limit of 14 mm"]),
+        (["show", *["8"] * 6, "high", *SIM], ["'high'", "not a height"]),
+        (["show", *SIM], ["one way"]),
+        (["show", "--all", "8", "--shape", "dome", *SIM], ["one way"]),
+        (["show", "--all", "8", "--over", "-1", *SIM], ["over is -1"]),
+        (["show", "--shape", "cube", *SIM], ["cube", "dome"]),
+        (["show", "--file", "nowhere.csv", *SIM], ["nowhere.csv"]),
+        (["info", "--device", "sim://wristband8"], ["wristband8", "wristband7"]),
+        (["info", "--device", "sim://wristband7?speed=3"], ["speed", "realtime"]),
+        (["info", "--device", "sim://wristband7?seed=x"], ["seed='x'"]),
+        (["info", "--device", ""], ["empty"]),
+        (["monitor", "--rate", "0", *SIM], ["rate_hz is 0"]),
+        (["monitor", "--rate", "nan", *SIM], ["rate_hz is nan"]),
+        (["sim", "--spread", "2"], ["spread is 2"]),
+        (["sim", "--port", "70000"], ["70000"]),
+        (["dance"], ["dance", "--help"]),
+        (["bench", "everything"], ["everything"]),
+    ],
+)
+def test_a_users_mistake_is_one_sentence_and_status_2(run, arguments, words):
+    assert_one_sentence(run(*arguments), 2, *words)
+
+
+@pytest.mark.parametrize(
+    ("device", "words"),
+    [("/dev/no-such-port", ["There is no", "sim://"]), ("socket://127.0.0.1:9", ["Nothing listens"])],
+)
+def test_a_devices_failure_is_one_sentence_and_status_1(run, device, words):
+    assert_one_sentence(run("info", "--device", device), 1, *words)
+
+
+def test_what_is_no_wristband_is_named_as_such(run):
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    try:
+        assert_one_sentence(run("info", "--device", os.ttyname(theirs)), 1, "does not answer as a wristband")
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_info_for_scripts(run):
+    status, out, _ = run("info", "--json", *SIM)
+    facts = json.loads(out)
+    assert status == 0
+    assert facts["board"] == "wristband7"
+    assert facts["bubbles"] == 7
+    assert facts["faults"] == {}
+
+
+def test_the_device_may_come_from_the_environment(run, monkeypatch):
+    monkeypatch.setenv("BUBBLESKIN_DEVICE", "sim://wristband19")
+    status, out, _ = run("info", "--json")
+    assert status == 0
+    assert json.loads(out)["bubbles"] == 19
+
+
+def test_show_reaches_what_it_says(run, tmp_path):
+    field = tmp_path / "field.csv"
+    field.write_text("6,10\n6,10\n")
+    for how in (
+        ["--all", "9.5"],
+        ["--shape", "plane"],
+        ["--file", str(field)],
+        ["6", "6", "6", "10", "10", "10", "12"],
+    ):
+        status, out, err = run("show", *how, "--json", *SIM)
+        assert status == 0, err
+        shape = json.loads(out)
+        assert max(abs(a - b) for a, b in zip(shape["height_mm"], shape["target_mm"], strict=True)) < 0.2
+
+
+def test_monitor_prints_a_line_for_each_state(run):
+    status, out, _ = run("monitor", "--rate", "50", "--seconds", "0.5", "--json", *SIM)
+    states = [json.loads(line) for line in out.splitlines()]
+    assert status == 0
+    assert len(states) == 26
+    assert states[-1]["time"] - states[0]["time"] == pytest.approx(0.5)
+
+
+def test_demo_prints_heights_and_draws(run, tmp_path):
+    picture = tmp_path / "demo.png"
+    status, out, _ = run("demo", "--output", str(picture))
+    assert status == 0
+    assert "dome" in out
+    assert "tilted plane" in out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_sim_serves_other_programs_until_it_is_interrupted():
+    command = [sys.executable, "-m", "bubbleskin.cli", "sim", "--json", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+        try:
+            device = json.loads(server.stdout.readline())["device"]
+            show = [sys.executable, "-m", "bubbleskin.cli", "show", "--shape", "dome", "--device", device]
+            shown = subprocess.run(show, capture_output=True, text=True, timeout=60, check=False)
+            assert shown.returncode == 0, shown.stderr
+        finally:
+            server.send_signal(2)
+            _, err = server.communicate(timeout=20)
+    assert server.returncode == 130
+    assert err.strip() == "Stopped."
