@@ -1,0 +1,108 @@
+"""One suite, every target: simulated, MicroPython in a subprocess, a real board. Through the public SDK only."""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import bubbleskin as bs
+
+TARGETS = ("sim://wristband7", "micropython://wristband7")
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--target",
+        action="append",
+        metavar="URL",
+        help=f"run hil_tests on this device; repeat for several (default: {' and '.join(TARGETS)})",
+    )
+
+
+def pytest_generate_tests(metafunc):
+    if "target" in metafunc.fixturenames:
+        metafunc.parametrize("target", metafunc.config.getoption("--target") or TARGETS, scope="session")
+
+
+def connect(target: str) -> bs.Skin:
+    try:
+        return bs.connect(target)
+    except bs.BubbleskinError as error:
+        # Only a missing interpreter is a plain BubbleskinError; a firmware that does not answer is a LinkError.
+        missing = target.startswith("micropython:") and type(error) is bs.BubbleskinError
+        if missing and not os.environ.get("CI"):
+            pytest.skip(str(error))
+        raise
+
+
+@pytest.fixture
+def skin(target: str) -> Iterator[bs.Skin]:
+    """A fresh connection to a flat wristband, which is vented in the end."""
+    with connect(target) as skin:
+        skin.vent()
+        skin.sleep(1.0)
+        yield skin
+        with contextlib.suppress(bs.LinkError):  # a test that lost the link has said so
+            skin.vent()
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What was seen: one row per moment. True heights and all pulses on a simulated board, estimates on a real one."""
+
+    time: NDArray[np.float64]
+    """s since the watch began, (k,)."""
+    height_mm: NDArray[np.float64]
+    """(k, n)."""
+    pulses: NDArray[np.bool_] | None
+    """Whether a valve pulse of the bubble began in the tick that followed, (k, n); None on a real board."""
+
+    def since(self, seconds: float) -> "Trace":
+        """The part from `seconds` on."""
+        late = self.time >= seconds - 1e-9
+        return Trace(self.time[late], self.height_mm[late], None if self.pulses is None else self.pulses[late])
+
+    def pulse_rate(self) -> NDArray[np.float64]:
+        """Pulses per second of each bubble, (n,)."""
+        assert self.pulses is not None
+        return self.pulses.sum(axis=0) / (self.time[-1] - self.time[0])
+
+    def busiest_second(self) -> NDArray[np.int64]:
+        """Most pulses of each bubble within any one second, (n,)."""
+        assert self.pulses is not None
+        count = np.cumsum(np.vstack([np.zeros_like(self.pulses[:1]), self.pulses]), axis=0, dtype=int)
+        second = round(1 / (self.time[1] - self.time[0]))
+        return (count[second:] - count[:-second]).max(axis=0)
+
+
+@pytest.fixture
+def watch(skin: bs.Skin) -> Callable[[float], Trace]:
+    """`watch(seconds)`: look at the bubbles for so long, from now on."""
+
+    def true_heights(board, seconds: float) -> Trace:
+        tick, n = skin.info.tick, skin.info.bubbles
+        ticks = round(seconds / tick) + 1
+        heights, on = np.empty((ticks, n)), np.empty((ticks, n, 2))
+        for k in range(ticks):
+            heights[k], on[k] = board.height_mm, board.pulses
+            skin.sleep(tick)
+        still_on = np.zeros(on.shape, bool)  # a valve that stays on begins no pulse
+        still_on[1:] = on[:-1] >= tick
+        return Trace(np.arange(ticks) * tick, heights, ((on > 0) & ~still_on).any(axis=2))
+
+    def estimates(seconds: float) -> Trace:
+        begin = skin.state().time
+        times, heights = [], []
+        with contextlib.closing(skin.telemetry(min(50, 1 / skin.info.tick))) as states:
+            for state in states:
+                times.append(state.time - begin)
+                heights.append(state.height_mm)
+                if times[-1] >= seconds:
+                    return Trace(np.array(times), np.array(heights), None)
+        raise AssertionError("telemetry has ended")
+
+    return lambda seconds: true_heights(skin.simulated, seconds) if skin.simulated else estimates(seconds)

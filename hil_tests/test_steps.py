@@ -1,0 +1,121 @@
+"""Step response and ramps: heights from 5.5 to 12.5 mm beside the plateau (7 to 9 mm), on bubbles that match their tables."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.timeout(240)
+
+LOW, PLATEAU_LOW, PLATEAU_HIGH, HIGH = 5.5, 7.0, 9.0, 12.5
+NEAR = 0.2
+SOON = 0.6
+STAYS = 10.0
+
+
+def random_heights(rng, n):
+    heights = rng.uniform(LOW, HIGH - (PLATEAU_HIGH - PLATEAU_LOW), n)
+    return np.where(heights < PLATEAU_LOW, heights, heights + PLATEAU_HIGH - PLATEAU_LOW)
+
+
+def check_step(skin, watch, start, target):
+    """Show `target` from `start` and check all that is promised of a step. Returns the heights at the end."""
+    skin.show(target, wait=False)
+    seen = watch(SOON + STAYS)
+    error = seen.height_mm - target
+    settled = seen.since(SOON)
+    assert np.abs(settled.height_mm - target).max() <= NEAR
+    assert (error * np.sign(target - start)).max() <= 0.3, "overshoot"
+    if settled.pulses is not None:
+        assert settled.pulse_rate().max() <= 2, "valve pulses per second at rest"
+        # Next to the plateau sensor noise is worth as much height as a dose: pulses are few there, but come in bursts.
+        steep = (target < PLATEAU_LOW) | (target > PLATEAU_HIGH + 0.5)
+        assert settled.busiest_second()[steep].max(initial=0) <= 2, "valve pulses in one second at rest"
+    return seen.height_mm[-1]
+
+
+def test_extremes_in_a_row(skin, watch):
+    n = skin.info.bubbles
+    other = np.where(np.arange(n) % 2, LOW, HIGH)
+    heights = np.full(n, skin.info.height_rest_mm)
+    for target in (np.full(n, HIGH), np.full(n, LOW), other, LOW + HIGH - other):
+        heights = check_step(skin, watch, heights, target)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_heights_in_a_row(skin, watch, seed):
+    rng = np.random.default_rng(seed)
+    heights = np.full(skin.info.bubbles, skin.info.height_rest_mm)
+    for _ in range(4):
+        heights = check_step(skin, watch, heights, random_heights(rng, skin.info.bubbles))
+
+
+def test_show_returns_when_all_is_settled(skin):
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        target = random_heights(rng, skin.info.bubbles)
+        before = skin.state().time
+        state = skin.show(target)
+        assert state.settled
+        assert state.mode == "active"
+        assert state.time - before < 1.0
+        assert state.target_mm == pytest.approx(target, abs=0.001)
+        assert state.height_mm == pytest.approx(target, abs=NEAR)
+
+
+def test_a_new_show_takes_over_at_once(skin, watch):
+    """Shows that do not wait for each other: only the last one counts."""
+    n = skin.info.bubbles
+    for height in (12.0, 6.0, 11.0, 5.5, 10.0):
+        skin.show(np.full(n, height), wait=False)
+        skin.sleep(0.07)
+    assert watch(2.0).since(SOON).height_mm == pytest.approx(10.0, abs=NEAR)
+
+
+def test_heights_up_to_rest_take_no_pressure(skin):
+    n = skin.info.bubbles
+    skin.show(np.full(n, 11.0))
+    state = skin.show(np.linspace(0, skin.info.height_rest_mm, n))
+    assert set(state.status) == {"resting"}
+    skin.sleep(1.0)
+    assert skin.state().pressure_kpa == pytest.approx(0, abs=0.4)
+
+
+def test_each_bubble_goes_its_own_way(skin):
+    """The order of bubbles is the layout's on the whole way to the membranes and back."""
+    n = skin.info.bubbles
+    for bubble in range(n):
+        target = np.full(n, 6.0)
+        target[bubble] = 11.0
+        skin.show(target)
+        if skin.simulated:
+            assert skin.simulated.height_mm == pytest.approx(target, abs=NEAR)
+        state = skin.state()
+        assert state.height_mm == pytest.approx(target, abs=NEAR)
+        assert np.argmax(state.pressure_kpa) == bubble
+
+
+@pytest.mark.parametrize("over", [1.0, 3.0])
+@pytest.mark.parametrize(("low", "high"), [(5.5, 6.9), (9.2, 12.5)])
+def test_a_ramp_takes_its_time(skin, watch, over, low, high):
+    n = skin.info.bubbles
+    skin.show(np.full(n, low))
+    skin.sleep(1.0)
+    for start, end in pairwise((low, high, low)):
+        skin.show(np.full(n, end), over=over, wait=False)
+        seen = watch(over + 1.0)
+        share = np.clip(seen.time / over, 0, 1)[:, None]
+        line = start + share * (end - start)
+        assert np.abs(seen.height_mm - line).max() <= 0.35
+        way = seen.height_mm * np.sign(end - start)
+        assert (np.maximum.accumulate(way, axis=0) - way).max() <= 0.15, "monotonic"
+        assert np.abs(seen.since(over + SOON).height_mm - end).max() <= NEAR
+
+
+def test_a_ramp_is_waited_for(skin):
+    n = skin.info.bubbles
+    skin.show(np.full(n, 9.5))
+    before = skin.state().time
+    state = skin.show(np.full(n, 12.0), over=2.0)
+    assert 1.9 <= state.time - before <= 3.0
+    assert state.settled
