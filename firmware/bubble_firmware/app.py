@@ -40,25 +40,34 @@ class App:
     def tick(self):
         """One period. Whatever goes wrong in it, the outputs go to vent and the next one is tried."""
         try:
-            self._tick()
+            self._control()
         except Exception:
-            self.exceptions += 1
-            self.vent()
-            self.hands.vent()
+            self._fail()
+        try:  # a board that cannot control still says so
+            self._talk()
+        except Exception:
+            self._fail()
             self.session.fail()
         self.ticks += 1
 
-    def _tick(self):
+    def _control(self):
         counts = self._counts
         self.hands.sense(counts)
         self.supply.sense(counts[self.board.BUBBLES])
         self.bubbles.sense(counts, self.supply.pressure_pa, self.mode)
         self.bubbles.decide(self.mode)
         self.hands.act(self.bubbles.pulses, self.supply.pump, self.supply.dump)
+
+    def _talk(self):
         self.session.poll()
         spent = self.hands.phase_us()
         if spent > self.tick_worst_us:
             self.tick_worst_us = spent
+
+    def _fail(self):
+        self.exceptions += 1
+        self.vent()
+        self.hands.vent()
 
     def show(self, values, first, over_ms):
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""

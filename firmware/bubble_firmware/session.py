@@ -65,9 +65,13 @@ class Session:
                 self._telemetry()
 
     def fail(self):
-        """Tell the host whose request was being handled that the device failed at it."""
+        """Tell the host whose request was being handled that the device failed at it: once, if the link still works."""
         if self._handling:
-            self._refuse(messages.FAULTED, 0, _NO_ELEMENT, 0, 0, 0)
+            try:
+                self._refuse(messages.FAULTED, 0, _NO_ELEMENT, 0, 0, 0)
+            except Exception:
+                pass
+            self._handling = 0
 
     def _handle(self, message_id, size):
         self._handling = message_id
