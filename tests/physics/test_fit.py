@@ -38,17 +38,15 @@ def test_intervals_cover_the_truth(kind):
         measured, true = simulate_sheet(7, settings=12, repeats=2, seed=seed)
         if kind == "shared prior":
             fits = list(fit_sheet(measured.bubble, measured.height, measured.pressure).values())
-        else:  # one bubble of each sheet by itself: 200 independent fits
-            one = measured.of(seed % 7)
-            fits, true = [fit_yeoh(one.height, one.pressure)], [true[seed % 7]]
+        else:
+            ones = [measured.of(n) for n in range(7)]
+            fits = [fit_yeoh(one.height, one.pressure) for one in ones]
         for fit, balloon in zip(fits, true, strict=True):
             low, high = fit.interval().T
             inside.append((low <= truth(balloon)) & (truth(balloon) <= high))
     covered = np.mean(inside, axis=0)
     print(f"{kind}: mu {covered[0]:.1%}, C2 {covered[1]:.1%}, C3 {covered[2]:.1%} of {len(inside)} fits")
-    # 200 fits have a standard error of 1.5 %; all three constants together are the promise.
-    assert np.mean(inside) >= 0.93
-    assert covered.min() >= (0.93 if len(inside) > SHEETS else 0.91)
+    assert covered.min() >= 0.93
 
 
 def test_intervals_are_not_just_wide():
@@ -118,8 +116,8 @@ def test_c3_is_never_negative():
 def test_bands_cover_the_curve():
     h = np.linspace(5.5, 13.5, 33) * 1e-3
     inside_p, inside_h = [], []
-    for seed in range(100):
-        measured, true = one_bubble(seed, settings=12, repeats=1)
+    for seed in range(150):
+        measured, true = one_bubble(seed, settings=12, repeats=2)
         fit = fit_yeoh(measured.height, measured.pressure)
         exact = true.pressure_at_height(h)
         low, high = fit.pressure_band(h)

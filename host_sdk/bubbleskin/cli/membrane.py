@@ -66,9 +66,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON."
 
 def picture_option(name: str) -> Callable[[F], F]:
     """The option that says where a picture goes."""
-    return click.option(
-        "-o", "--output", type=DATA, default=f"{name}.png", show_default=True, help="png, svg or pdf."
-    )
+    return click.option("-o", "--output", type=DATA, default=f"{name}.png", show_default=True, help="png, svg or pdf.")
 
 
 @click.command()
@@ -119,9 +117,7 @@ def table(
         calibration = _calibration(found, f"fit of {measurements.source}", board, knots, up_to_mm)
     else:
         balloons = [_balloon(preset, **options)] * bubbles
-        calibration = _calibration(
-            balloons, balloons[0].describe() if balloons else "", board, knots, up_to_mm
-        )
+        calibration = _calibration(balloons, balloons[0].describe() if balloons else "", board, knots, up_to_mm)
     click.echo(json.dumps(calibration.as_dict(), indent=2) if as_json else calibration.report())
     if output:
         calibration.save(output)

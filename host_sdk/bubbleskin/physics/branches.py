@@ -13,6 +13,7 @@ Function = Callable[[Any], Any]  # of arrays and of single numbers
 
 SCAN = 600  # points of the search for turning points, even in log λ
 GRID = 400  # points per piece from which Newton starts
+SMALL = 1e-11  # relative step after which a solution is done
 ITERATIONS = 100  # Newton needs 3 to 5; halving, its fallback, at most 60
 
 
@@ -93,7 +94,7 @@ class MonotonePieces:
             new[bad] = (low[active][bad] + high[active][bad]) / 2
             new[error == 0] = xa[error == 0]
             x[active] = new
-            active = active[np.abs(new - xa) > 4e-16 * xa]
+            active = active[np.abs(new - xa) > SMALL * xa]  # Newton doubles the digits: the rest is rounding
             if not active.size:
                 break
         return x

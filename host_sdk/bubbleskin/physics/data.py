@@ -119,7 +119,12 @@ def read_csv(path: str | Path, *, skip_bad_rows: bool = False) -> Measurements:
 
 
 def write_csv(path: str | Path, measurements: Measurements, *, comments: Iterable[str] = ()) -> None:
-    """Write ``measurements`` in mm and kPa so that :func:`read_csv` reads them again, to 1 µm and 1 Pa."""
+    """Write ``measurements`` to ``path`` so that :func:`read_csv` reads them again; see :func:`to_csv`."""
+    Path(path).write_text(to_csv(measurements, comments=comments), encoding="utf-8")
+
+
+def to_csv(measurements: Measurements, *, comments: Iterable[str] = ()) -> str:
+    """The text of a file of ``measurements``, in mm and kPa, to 1 µm and 1 Pa."""
     heading = [
         "bubble",
         *(["step"] if measurements.step is not None else []),
@@ -133,7 +138,7 @@ def write_csv(path: str | Path, measurements: Measurements, *, comments: Iterabl
             cells.append(str(int(measurements.step[k])))
         cells += [f"{measurements.height[k] * 1e3:.3f}", f"{measurements.pressure[k] / 1e3:.3f}"]
         lines.append(",".join(cells))
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
 def _heading(path: Path, cells: list[str]) -> list[tuple[str, float] | None]:

@@ -169,8 +169,8 @@ def fit_yeoh(
     The points may come from one bubble or, pooled, from many; :func:`fit_sheet` fits each by itself.
     ``radius``, ``thickness``, ``wall`` and ``surface`` are taken as given, as :class:`YeohBalloon` has them.
     Noise is in both axes; only the ratio of ``height_sd`` (m) to ``pressure_sd`` (Pa), scalars or (n,),
-    matters, for its size is found from the residuals. ``robust`` leaves out points more than 4 standard
-    deviations off. C3 is kept ≥ 0.
+    matters, for its size is found from the residuals. ``robust`` leaves out points that noise would put
+    so far off the curve once in 16000 times. C3 is kept ≥ 0.
 
     ``step`` (n,) names the setting of each point, and points of one setting are repeats (triplicates).
     If they agree with each other much better than with the model, the model is at fault, not the noise:

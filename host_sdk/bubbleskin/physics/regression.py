@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.physics import wall as walls
@@ -20,7 +21,7 @@ from bubbleskin.physics.balloon import Surface, Wall, YeohBalloon, yeoh_pressure
 
 HUBER = 1.345  # standard deviations; these two give 95 % efficiency on clean Gaussian noise
 BISQUARE = 4.685
-CUT = 4.0  # standard deviations from the curve that make an outlier: one good point in 16000 is lost
+LOST = 6e-5  # of good points are taken for outliers: with many points those beyond 4 standard deviations
 PASSES = 60
 TOLERANCE = 1e-7  # relative change of θ at which the passes end
 
@@ -175,9 +176,13 @@ def bisquare(u: np.ndarray) -> np.ndarray:
     return np.clip(1 - (u / BISQUARE) ** 2, 0, None) ** 2
 
 
-def within(residuals: np.ndarray, scale: float) -> np.ndarray:
-    """1 for points within :data:`CUT` standard deviations, 0 for outliers; at least 4 are kept."""
-    kept = np.abs(residuals) <= CUT * scale
+def within(residuals: np.ndarray, scale: float, fitted: float = 3) -> np.ndarray:
+    """1 for good points, 0 for outliers; at least 4 are kept.
+
+    The fewer the points, the less is known of the scale, and the further out a point must be.
+    """
+    cut = float(stats.t.isf(LOST / 2, max(residuals.size - fitted, 1.0)))
+    kept = np.abs(residuals) <= cut * scale
     if kept.sum() < 4:
         kept[np.argsort(np.abs(residuals))[:4]] = True
     return kept.astype(float)

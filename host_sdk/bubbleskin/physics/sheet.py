@@ -234,7 +234,7 @@ class _Sheet:
             self.scale = float(np.sqrt((STATED + r.size * median_scale(r, 0) ** 2) / (STATED + r.size)))
             self.weights = weigh(r / self.scale)
         elif self.robust:
-            self.weights = within(r, self.scale)
+            self.weights = within(r, self.scale, self.fitted)
         self.dof = STATED + max(float(self.weights.sum()) - self.fitted, 0.0)
         if weigh is None or not self.robust:
             self.scale = float(np.sqrt((STATED + np.sum(self.weights * r**2)) / self.dof))

@@ -79,9 +79,7 @@ def plot_fit(fit: YeohFit | SheetFit, measurements: Measurements, *, title: str 
             for k, (number, one) in enumerate(fit.items()):
                 colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
                 draw_curve(axes, one.balloon, up_to_mm=top, colour=colour, thin=True)
-                _draw_points(
-                    axes, one, measurements.of(number), colour=colour, marker=marker, label=f"bubble {number}"
-                )
+                _draw_points(axes, one, measurements.of(number), colour=colour, marker=marker, label=f"bubble {number}")
         axes.set_title(title or measurements.source, loc="left")
         axes.legend(loc="upper left", handlelength=1.6)
         return figure
@@ -227,14 +225,10 @@ def _draw_plateau(axes: Axes, fit: YeohFit, measurements: Measurements) -> None:
 def _draw_band(axes: Axes, fit: YeohFit, top_mm: float) -> None:
     h = np.linspace(fit.balloon.rest_height, top_mm * 1e-3, 240)
     low, high = fit.pressure_band(h)
-    axes.fill_betweenx(
-        h * 1e3, low / 1e3, high / 1e3, color=COLOURS[0], alpha=0.2, lw=0, label="95 % confidence"
-    )
+    axes.fill_betweenx(h * 1e3, low / 1e3, high / 1e3, color=COLOURS[0], alpha=0.2, lw=0, label="95 % confidence")
 
 
-def _draw_points(
-    axes: Axes, fit: YeohFit, measurements: Measurements, *, colour: str, marker: str, label: str
-) -> None:
+def _draw_points(axes: Axes, fit: YeohFit, measurements: Measurements, *, colour: str, marker: str, label: str) -> None:
     kept = ~fit.outliers
     out = measurements
     axes.plot(out.pressure[~kept] / 1e3, out.height[~kept] * 1e3, "x", color=colour, ms=5, mew=1.2)
