@@ -33,6 +33,8 @@ class Session:
         self.telemetry_dropped = 0
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
+        boot_id = app.hands.boot_id & 0xFFFFFFFF
+        self._boot_id = boot_id - (boot_id >> 31 << 32)  # the same 32 bits as a signed word
         self._requests = {
             messages.HELLO: self._hello,
             messages.PING: self._ping,
@@ -127,7 +129,7 @@ class Session:
         values[0] = PROTOCOL_MIN
         values[1] = PROTOCOL_MAX
         values[2] = self._schema_crc
-        values[3] = self._app.hands.boot_id
+        values[3] = self._boot_id
         values[4], values[5], values[6] = FIRMWARE
         for index in range(16):
             values[7 + index] = ord(board.NAME[index]) if index < len(board.NAME) else 0
