@@ -25,6 +25,7 @@ class Hands:
         self.pulses = None
         self.pump = self.dump = None
         self.in_vent = False
+        self.full = False  # no room for what is sent
         self.broken = set()  # names of hands that raise
 
     def _use(self, name):
@@ -50,6 +51,8 @@ class Hands:
 
     def send(self, frame, length):
         self._use("send")
+        if self.full:
+            return False
         self.from_device += frame[:length]
         return True
 
