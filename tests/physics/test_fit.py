@@ -30,6 +30,7 @@ def one_bubble(seed: int, balloon: YeohBalloon | None = None, **options):
     return measured, true
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["each bubble", "shared prior"])
 def test_intervals_cover_the_truth(kind):
     """200 sheets of seven bubbles, 0.15 kPa and 0.05 mm of noise: at least 93 % for every constant."""
@@ -218,7 +219,7 @@ GOOD_P = YeohBalloon().pressure_at_height(GOOD_H)
         ({"height": GOOD_H * 1e3}, "divide mm by 1000"),
         ({"height": GOOD_H[:5]}, "equal length"),
         ({"height": np.full(10, 5.01e-3)}, "no inflation to fit"),
-        ({"pressure": GOOD_P[::-1]}, "shear modulus of"),
+        ({"pressure": np.linspace(60e3, 1e3, 10)}, "shear modulus of -"),
         ({"thickness": 0}, "thickness is 0 m"),
         ({"pressure_sd": 0}, "pressure_sd is 0"),
         ({"height_sd": [1e-3, 1e-3]}, "one number or one per point"),
