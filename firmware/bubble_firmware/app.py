@@ -65,9 +65,9 @@ class App:
             self.tick_worst_us = spent
 
     def _fail(self):
+        self.hands.vent()  # first of all
         self.exceptions += 1
         self.vent()
-        self.hands.vent()
 
     def show(self, values, first, over_ms):
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""

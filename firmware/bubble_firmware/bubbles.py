@@ -101,7 +101,8 @@ class Bubbles:
     def rest(self):
         """No bubble is wanted higher than it is without pressure."""
         row = self._rows
-        for at in range(0, self.count * control.ROW, control.ROW):
+        for i in range(self.count):
+            at = i * control.ROW  # a range with a step would be an allocation, and this is called when memory is out
             row[at + control.START] = row[at + control.TARGET] = self._board[control.REST_UM]
         self._ramp(1)
 
@@ -110,8 +111,8 @@ class Bubbles:
 
         What leads to a fault goes on counting: a host that clears all the time does not disarm the guard.
         """
-        for at in range(0, self.count * control.ROW, control.ROW):
-            self._rows[at + control.FAULTS] = 0
+        for i in range(self.count):
+            self._rows[i * control.ROW + control.FAULTS] = 0
 
     def report(self, values, at):
         """Put the repeated fields of STATE at `values[at:]`."""
