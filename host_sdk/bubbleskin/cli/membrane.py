@@ -175,7 +175,7 @@ def plot_table(calibration: Path, bubble: int, output: Path) -> None:
 @click.option("--seed", type=int, default=4, show_default=True)
 @picture_option("figure4")
 def plot_figure_4(seed: int, output: Path) -> None:
-    """The paper's Fig. 4, height against pressure with the model, from simulated measurements."""
+    """Like figure 4 of the paper: height against pressure with the model, from simulated measurements."""
     from bubbleskin.plot import membrane
 
     membrane.save(membrane.figure_4(seed=seed)[0], output)
@@ -186,7 +186,7 @@ def plot_figure_4(seed: int, output: Path) -> None:
 @click.option("--seed", type=int, default=6, show_default=True)
 @picture_option("figure6")
 def plot_figure_6(seed: int, output: Path) -> None:
-    """The paper's Fig. 6, how bubbles of one sheet differ, from simulated measurements."""
+    """Like figure 6 of the paper: how bubbles of one sheet differ, from simulated measurements."""
     from bubbleskin.plot import membrane
 
     membrane.save(membrane.figure_6(seed=seed)[0], output)
