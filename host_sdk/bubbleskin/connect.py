@@ -9,6 +9,7 @@ from bubbleskin.link.transport import SerialTransport, Transport, only_attached
 from bubbleskin.skin import AsyncSkin, Skin
 
 SIMULATED = ("sim", "micropython")
+NETWORK = ("socket", "rfc2217")
 
 
 def connect(url: str | None = None, *, timeout: float = 2.0) -> Skin:
@@ -21,14 +22,16 @@ def connect(url: str | None = None, *, timeout: float = 2.0) -> Skin:
     Raises `InvalidInput` for a URL that cannot be meant, `LinkError` where nothing can be opened and
     `WrongDevice` where what is there is no wristband.
     """
+    patience = _checked(timeout)
     transport, board = open_transport(url)
-    return Skin(drive(AsyncSkin.open(transport, _checked(timeout), simulated=board)))
+    return Skin(drive(AsyncSkin.open(transport, patience, simulated=board)))
 
 
 async def aconnect(url: str | None = None, *, timeout: float = 2.0) -> AsyncSkin:
     """The same for asyncio: a skin whose methods are coroutines."""
+    patience = _checked(timeout)
     transport, board = open_transport(url)
-    return await AsyncSkin.open(transport, _checked(timeout), threads=board is None, simulated=board)
+    return await AsyncSkin.open(transport, patience, event_loop=True, simulated=board)
 
 
 def open_transport(url: str | None) -> tuple[Transport, Any]:
@@ -37,8 +40,19 @@ def open_transport(url: str | None) -> tuple[Transport, Any]:
         return SerialTransport(only_attached()), None
     if not url.strip():
         raise InvalidInput("The device's name is empty; give a port or a URL, such as sim://wristband7.")
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError as error:
+        raise InvalidInput(f"{url} is not a port or URL that can be opened: {error}.") from None
+    if parts.scheme in NETWORK and not (parts.hostname and port):
+        raise InvalidInput(f"{url} does not name host and port; write {parts.scheme}://host:7707.")
     if parts.scheme in SIMULATED:
+        if parts.path or parts.fragment:
+            raise InvalidInput(
+                f"{url} is not a simulated board; write {parts.scheme}://wristband7, "
+                f"with options after a question mark, such as {parts.scheme}://wristband7?seed=3."
+            )
         from bubbleskin.sim import open_board
 
         return open_board(parts.scheme, parts.netloc, dict(parse_qsl(parts.query, keep_blank_values=True)))

@@ -1,5 +1,6 @@
 """What a script holds: one wristband, real or simulated. `AsyncSkin` does the work, `Skin` runs it without an event loop."""
 
+import asyncio
 import contextlib
 from collections.abc import AsyncGenerator, Iterator, Sequence
 from types import TracebackType
@@ -35,18 +36,24 @@ class AsyncSkin:
         self.info = info
         self.layout = layout
         self.simulated = simulated
+        self._telemetry = 0  # number of the newest telemetry iterator
 
     @classmethod
     async def open(
-        cls, transport: Transport, timeout: float, *, threads: bool = False, simulated: "SimulatedBoard | None" = None
+        cls,
+        transport: Transport,
+        timeout: float,
+        *,
+        event_loop: bool = False,
+        simulated: "SimulatedBoard | None" = None,
     ) -> Self:
         """Greet the device at the other end of `transport`."""
+        link = Link(transport, timeout, event_loop=event_loop)
         try:
-            link = Link(transport, timeout, threads=threads)
             info = Info.of(await link.hello())
             return cls(link, info, Layout.of_board(info.board, info.bubbles), simulated)
         except BaseException:
-            transport.close()
+            await link.close()
             raise
 
     async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
@@ -98,19 +105,25 @@ class AsyncSkin:
             )
         period = max(1, round(highest / rate_hz))
         link = self._link
+        self._telemetry = mine = self._telemetry + 1
         link.telemetry.clear()
-        await link.call("SUBSCRIBE", (period,))
         patience = period * self.info.tick + link.timeout
         try:
+            await link.call("SUBSCRIBE", (period,))
             while True:
-                await link.wait(link.transport.now() + patience, lambda: bool(link.telemetry))
-                if not link.telemetry:
-                    await link.call("PING", (0,))  # says what is wrong where the device has gone
-                    continue
-                yield State.of(link.telemetry.popleft(), self.info.tick)
-        except GeneratorExit:
-            with contextlib.suppress(LinkError):
-                await link.call("SUBSCRIBE", (0,))
+                await link.wait(
+                    link.transport.now() + patience, lambda: bool(link.telemetry) or mine != self._telemetry
+                )
+                if mine != self._telemetry:
+                    return
+                if link.telemetry:
+                    yield State.of(link.telemetry.popleft(), self.info.tick)
+                else:
+                    await link.call("SUBSCRIBE", (period,))  # forgotten there, or nobody is there: then this says so
+        except (GeneratorExit, asyncio.CancelledError):
+            if mine == self._telemetry:
+                with contextlib.suppress(LinkError):
+                    await link.call("SUBSCRIBE", (0,))
             raise
 
     async def stop(self) -> None:
@@ -168,7 +181,7 @@ class AsyncSkin:
 
     async def aclose(self) -> None:
         """Let go of the device. It keeps its shape; `vent` first to leave it flat."""
-        self._link.close()
+        await self._link.close()
 
     async def __aenter__(self) -> Self:
         return self
@@ -224,11 +237,16 @@ class Skin:
         return drive(self._skin.health())
 
     def telemetry(self, rate_hz: float = 20) -> Iterator[State]:
-        """States as the device sends them, without end; close the iterator or leave the loop to end it."""
+        """States as the device sends them, without end; close the iterator or leave the loop to end it.
+
+        There is one telemetry at a time: a new one ends the one before it.
+        """
         states = self._skin.telemetry(rate_hz)
         try:
             while True:
                 yield drive(_next(states))
+        except StopAsyncIteration:
+            pass
         finally:
             drive(states.aclose())
 

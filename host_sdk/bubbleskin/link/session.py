@@ -1,13 +1,14 @@
 """Requests and replies over one transport: each request has one reply or one error, in time."""
 
 import asyncio
+import contextlib
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
 
 from bubble_protocol import codec, messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.errors import DeviceRefused, DeviceSilent, WrongDevice
+from bubbleskin.errors import DeviceRefused, DeviceSilent, LinkError, WrongDevice
 from bubbleskin.link import wire
 from bubbleskin.link.transport import Transport
 
@@ -16,6 +17,8 @@ RESEND = 0.25
 handled twice with the same outcome."""
 
 _TELEMETRY_KEPT = 4096
+_SLICE = 0.02
+"""Seconds for which one task reads before another has its turn."""
 
 _T = TypeVar("_T")
 
@@ -23,28 +26,30 @@ _T = TypeVar("_T")
 class Link:
     """One device at the other end of `transport`.
 
-    Everything is a coroutine. With `threads` false the transport is read in place and no coroutine ever
-    suspends, so that `drive` can run it without an event loop; with true it is read in a thread.
+    Everything is a coroutine. Without an event loop the transport is read in place and no coroutine ever
+    suspends, so that `drive` can run it. With one, other tasks have their turn while this one waits: a
+    transport that waits by the wall's clock is read in a thread.
     """
 
-    def __init__(self, transport: Transport, timeout: float, *, threads: bool = False):
+    def __init__(self, transport: Transport, timeout: float, *, event_loop: bool = False):
         self.transport = transport
         self.timeout = timeout
         self.telemetry: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
-        self._threads = threads
+        self._event_loop = event_loop
         self._reader = wire.Reader()
+        self._heard = False
         self._replies: dict[int, wire.Received] = {}
         self._sequence = 0
         self._reading = asyncio.Lock()
-        self._pending: asyncio.Future[bytes] | None = None
-        transport.write(b"\0")  # whatever half frame stood on the line ends here
+        self._thread: asyncio.Future[None] | None = None
 
     async def hello(self) -> wire.Received:
         """Ask who is there. `WrongDevice` where that is no wristband or one we cannot talk to."""
+        self.transport.write(b"\0")  # whatever half frame stood on the line ends here
         try:
             reply = await self.call("HELLO", (PROTOCOL_MIN, PROTOCOL_MAX))
         except DeviceSilent:
-            heard = "It sends data, but not ours." if self._reader.bad else "It says nothing at all."
+            heard = "It sends data, but not ours." if self._heard else "It says nothing at all."
             raise WrongDevice(
                 f"What is at {self.transport.name} does not answer as a wristband within {self.timeout:g} s. {heard} "
                 "Check that it is the right port and that the wristband runs bubbleskin firmware."
@@ -59,6 +64,7 @@ class Link:
     ) -> wire.Received:
         """Send a request and wait for its reply. `DeviceRefused` or `DeviceSilent` where there is none."""
         sequence = self._sequence = self._sequence + 1 & 0xFFFF
+        self._replies.pop(sequence, None)  # a late one, to the request that had this number 65536 requests ago
         request = codec.BY_NAME[name].id
         frame = wire.encode(name, sequence, fixed, repeated)
         patience = self.timeout if timeout is None else timeout
@@ -82,37 +88,51 @@ class Link:
 
     async def wait(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
         """Take what comes until `done()` or the transport's clock stands at `until`."""
-        while not done() and (left := until - self.transport.now()) > 0:
+        while not done() and self.transport.now() < until:
             async with self._reading:
-                if not done():
-                    self._take(await self._read(left))
+                left = until - self.transport.now()
+                if left > 0 and not done():
+                    await self._receive(left)
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Let go of the transport."""
-        self.transport.close()
+        try:
+            if self._thread:  # a port must not close under its reader
+                with contextlib.suppress(LinkError):
+                    await asyncio.shield(self._thread)
+        finally:
+            self.transport.close()
 
     def _take(self, data: bytes) -> None:
+        self._heard = self._heard or bool(data)
         for message in self._reader.feed(data):
             if message.id == messages.TELEMETRY:
                 self.telemetry.append(message)
             elif message.id & messages.REPLY or message.id == messages.ERROR:
-                # Replies to requests given up long ago are dropped when their number comes round again.
                 if len(self._replies) > 64:
                     self._replies.clear()
                 self._replies[message.sequence] = message
 
-    async def _read(self, timeout: float) -> bytes:
-        if not self._threads:
-            return self.transport.read(timeout)
-        # A cancelled wait must not lose what the thread is about to read: the next one takes it up.
-        if self._pending is None:
-            self._pending = asyncio.ensure_future(asyncio.to_thread(self.transport.read, min(timeout, 0.05)))
-        pending = self._pending
-        try:
-            return await asyncio.shield(pending)
-        finally:
-            if pending.done():
-                self._pending = None
+    async def _receive(self, timeout: float) -> None:
+        """Take what comes within `timeout`; with an event loop, within a slice of it."""
+        if not self._event_loop:
+            self._take(self.transport.read(timeout))
+        elif not self.transport.blocks:
+            self._take(self.transport.read(min(timeout, _SLICE)))
+            await asyncio.sleep(0)
+        else:
+            # A cancelled wait must not lose what the thread is about to read: it goes on, and takes it.
+            if self._thread is None:
+                self._thread = asyncio.ensure_future(self._receive_in_thread(min(timeout, _SLICE)))
+            thread = self._thread
+            try:
+                await asyncio.shield(thread)
+            finally:
+                if thread.done():
+                    self._thread = None
+
+    async def _receive_in_thread(self, timeout: float) -> None:
+        self._take(await asyncio.to_thread(self.transport.read, timeout))
 
 
 def drive(coroutine: Coroutine[Any, Any, _T]) -> _T:

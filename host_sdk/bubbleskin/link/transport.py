@@ -18,6 +18,8 @@ class Transport(Protocol):
     """What the link needs of a way to a device."""
 
     name: str
+    blocks: bool
+    """Whether `read` waits by the wall's clock; otherwise it returns as soon as a simulation has been stepped."""
 
     def read(self, timeout: float) -> bytes:
         """Wait up to `timeout` seconds of this transport's own clock for bytes; none when none came."""
@@ -34,6 +36,8 @@ class Transport(Protocol):
 
 class SerialTransport:
     """A serial port, or anything that pyserial opens: /dev/ttyACM0, COM3, socket://…, rfc2217://…"""
+
+    blocks = True
 
     def __init__(self, url: str):
         self.name = url
@@ -78,8 +82,11 @@ class SerialTransport:
 
     def close(self) -> None:
         """Let go of the port."""
+        left = getattr(self._port, "_socket", None)  # pyserial forgets to close it when the other end has gone
         with contextlib.suppress(serial.SerialException, OSError):
             self._port.close()
+        if left:
+            left.close()
 
 
 def attached() -> list[str]:

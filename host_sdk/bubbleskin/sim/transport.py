@@ -15,6 +15,7 @@ class SimulatedTransport:
     def __init__(self, board: SimulatedBoard, name: str, realtime: bool = False):
         self.board = board
         self.name = name
+        self.blocks = realtime
         self._pace = Pace(board) if realtime else None
         self._closed = False
 
@@ -91,7 +92,8 @@ class Options:
             try:
                 values[key] = float(text) if key == "spread" else int(text)
             except ValueError:
-                raise InvalidInput(f"{url} has {key}={text!r}, which is not a number.") from None
+                kind = "a number" if key == "spread" else "a whole number"
+                raise InvalidInput(f"{url} has {key}={text!r}, which is not {kind}.") from None
         return cls(int(values.get("seed", 0)), values.get("spread", 0.0), bool(values.get("realtime", 0)))
 
 
