@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.errors import InvalidInput
+from bubbleskin.errors import InvalidInput, WrongDevice
 
 _NEIGHBOUR = 1.25  # bubbles nearer than this many pitches touch when they grow
 
@@ -84,9 +84,12 @@ class Layout:
     def of_board(cls, board: str, bubbles: int) -> Self:
         """The layout of a board that we know by name; otherwise one row of `bubbles`."""
         rings = {"wristband7": 1, "wristband19": 2}.get(board)
-        layout = cls.hexagon(rings) if rings is not None else cls.grid(1, bubbles)
+        layout = cls.hexagon(rings) if rings is not None else cls.grid(1, max(bubbles, 1))
         if len(layout) != bubbles:
-            raise InvalidInput(f"A {board} has {len(layout)} bubbles, but this one reports {bubbles}.")
+            raise WrongDevice(
+                f"The device calls itself {board}, which has {len(layout)} bubbles, but reports {bubbles}. "
+                "Check that the firmware on it was made for this board."
+            )
         return layout
 
     @cached_property

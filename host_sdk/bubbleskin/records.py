@@ -78,7 +78,7 @@ class Health:
             time=reply["ticks"] * tick,
             tick_worst=reply["tick_worst_us"] * 1e-6,
             supply_kpa=reply["supply_pa"] / 1000,
-            mode=_MODES[reply["mode"]],
+            mode=_MODES.get(reply["mode"], "unknown"),
             **same,
         )
 
@@ -106,11 +106,11 @@ class State:
         columns = message.columns
         return cls(
             time=message["ticks"] * tick,
-            mode=_MODES[message["mode"]],
+            mode=_MODES.get(message["mode"], "unknown"),
             height_mm=columns["height_um"] / 1000,
             pressure_kpa=columns["pressure_pa"] / 1000,
             target_mm=columns["target_um"] / 1000,
-            status=tuple(_STATUSES[status] for status in columns["status"].tolist()),
+            status=tuple(_STATUSES.get(status, "unknown") for status in columns["status"].tolist()),
             faults=tuple(
                 tuple(name for bit, name, _ in messages.FAULTS if faults & bit) for faults in columns["faults"].tolist()
             ),

@@ -109,8 +109,9 @@ def explain(error: Received) -> str:
     name = request.name if request else f"message 0x{error['request']:02x}"
     code = error["error"]
     asked, low, high = error["asked"], error["low"], error["high"]
-    if code == messages.OUT_OF_RANGE and request:
-        field = (request.fixed + request.repeated)[error["field"]]
+    fields = request.fixed + request.repeated if request else ()
+    if request and code == messages.OUT_OF_RANGE and error["field"] < len(fields):
+        field = fields[error["field"]]
         unit = f" {field[2]}" if field[2] else ""
         where = f" (entry {error['element']})" if error["field"] >= len(request.fixed) else ""
         return f"The wristband refused {name}: {field[0]}{where} is {asked}{unit}; {low} to {high}{unit} is allowed."

@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 
+_ROUNDING = 5e-4
+"""mm. Heights travel in whole µm: a last digit that interpolation got wrong is within the limits."""
+
 Heights = ArrayLike | Callable[[Any, Any], Any]
 
 
@@ -36,15 +39,15 @@ def sample(heights_mm: Heights, layout: Layout, height_max_mm: float) -> NDArray
         )
     for wrong, what in (
         (~np.isfinite(heights), "is not a number"),
-        (heights < 0, "is negative"),
-        (heights > height_max_mm, f"is above the limit of {height_max_mm:g} mm"),
+        (heights < -_ROUNDING, "is negative"),
+        (heights > height_max_mm + _ROUNDING, f"is above the limit of {height_max_mm:g} mm"),
     ):
         if wrong.any():
             bubble = int(np.flatnonzero(wrong)[0])
             raise InvalidInput(
                 f"The height of bubble {bubble}, {heights[bubble]:g} mm, {what}; heights are 0 to {height_max_mm:g} mm."
             )
-    return heights
+    return heights.clip(0, height_max_mm)
 
 
 def _numbers(values: Any) -> NDArray[np.float64]:
