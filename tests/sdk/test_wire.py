@@ -1,0 +1,210 @@
+"""Messages as Python values: what is decoded, and the sentence for every refusal."""
+
+import random
+import zlib
+
+import numpy as np
+import pytest
+
+from bubble_protocol import codec, framing, messages
+from bubbleskin.link import wire
+from bubbleskin.records import Health, Info, State
+
+
+def receive(*frames):
+    return list(wire.Reader().feed(b"".join(frames)))
+
+
+def error(code, request=messages.SHOW, field=0, element=255, asked=0, low=0, high=0):
+    (received,) = receive(wire.encode("ERROR", 1, (request, code, field, element, asked, low, high)))
+    return received
+
+
+def crc(data):
+    return zlib.crc32(data).to_bytes(4, "little")
+
+
+def text16(text):
+    return list(text.encode().ljust(16, b"\0"))
+
+
+HELLO = (
+    1,
+    1,
+    wire.SCHEMA_CRC,
+    0xFFFFFFFE,
+    0,
+    1,
+    7,
+    *text16("wristband7"),
+    7,
+    5000,
+    5000,
+    14000,
+    42000,
+    1,
+    0,
+    0x80000001,
+)
+
+
+def test_a_message_has_fields_by_name_and_columns_by_name():
+    rows = [(5000 + bubble, -10 * bubble, 6000, bubble % 5, bubble) for bubble in range(7)]
+    (state,) = receive(wire.encode("STATE_REPLY", 77, (0xFFFFFFFF, 1), rows))
+    assert state.id == messages.STATE | messages.REPLY
+    assert state.sequence == 77
+    assert state.fields == {"ticks": 0xFFFFFFFF, "mode": 1}
+    assert state["ticks"] == 0xFFFFFFFF
+    assert list(state.columns) == ["height_um", "pressure_pa", "target_um", "status", "faults"]
+    assert np.array_equal(np.column_stack(list(state.columns.values())), rows)
+
+
+def test_text_arrives_as_text():
+    (hello,) = receive(wire.encode("HELLO_REPLY", 1, HELLO))
+    assert hello.fields["board"] == "wristband7"
+    assert hello["boot_id"] == 0xFFFFFFFE
+    assert hello["tables_crc"] == 0x80000001
+
+
+def test_info_health_and_state_are_in_the_units_of_their_names():
+    (hello,) = receive(wire.encode("HELLO_REPLY", 1, HELLO))
+    info = Info.of(hello)
+    assert (info.board, info.bubbles, info.firmware, info.protocol) == ("wristband7", 7, "0.1.7", (1, 1))
+    assert info.same_schema
+    assert (info.tick, info.height_rest_mm, info.height_max_mm, info.pressure_max_kpa) == (0.005, 5.0, 14.0, 42.0)
+    counters = (400, 3, 1000, 1, 17, 2, 5, 123456, 59990, 0xDEADBEEF, messages.HOLDING)
+    (reply,) = receive(wire.encode("INFO_REPLY", 1, counters))
+    assert Health.of(reply, info.tick) == Health(
+        time=2.0,
+        late_ticks=3,
+        tick_worst=0.001,
+        exceptions=1,
+        frames_good=17,
+        frames_bad=2,
+        telemetry_dropped=5,
+        heap_free=123456,
+        supply_kpa=59.99,
+        tables_crc=0xDEADBEEF,
+        mode="holding",
+    )
+    (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 1), [(12345, -34, 12000, 2, 0), (5000, 0, 0, 4, 5)]))
+    state = State.of(reply, info.tick)
+    assert (state.time, state.mode, state.status) == (2.0, "active", ("settled", "fault"))
+    assert state.height_mm.tolist() == [12.345, 5.0]
+    assert state.pressure_kpa.tolist() == [-0.034, 0.0]
+    assert state.target_mm.tolist() == [12.0, 0.0]
+    assert state.faults == ((), ("overpressure", "valve_time"))
+    assert not state.settled
+
+
+def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
+    (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 99), [(5000, 0, 0, 99, 128)]))
+    state = State.of(reply, 0.005)
+    assert (state.mode, state.status, state.faults) == ("unknown", ("unknown",), ((),))
+    assert not state.settled
+    (reply,) = receive(wire.encode("INFO_REPLY", 1, (*[0] * 10, 99)))
+    assert Health.of(reply, 0.005).mode == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("received", "sentence"),
+    [
+        (
+            error(messages.UNKNOWN_MESSAGE, request=0x55),
+            "The wristband does not know message 0x55: its firmware is older than this SDK. Update the firmware.",
+        ),
+        (
+            error(messages.WRONG_LENGTH, asked=3, low=2, high=247),
+            "The wristband refused SHOW: a payload of 3 bytes; 2 to 247 are allowed. Update SDK or firmware.",
+        ),
+        (
+            error(messages.OUT_OF_RANGE, asked=60001, high=60000),
+            "The wristband refused SHOW: over_ms is 60001 ms; 0 to 60000 ms is allowed.",
+        ),
+        (
+            error(messages.OUT_OF_RANGE, field=1, element=3, asked=14001, high=14000),
+            "The wristband refused SHOW: height_um (entry 3) is 14001 µm; 0 to 14000 µm is allowed.",
+        ),
+        (
+            error(messages.OUT_OF_RANGE, request=messages.TABLE_READ, asked=7, high=6),
+            "The wristband refused TABLE_READ: bubble is 7; 0 to 6 is allowed.",
+        ),
+        (
+            error(messages.WRONG_COUNT, field=1, asked=6, low=7, high=7),
+            "The wristband refused SHOW: 6 entries for its 7 bubbles; send one per bubble.",
+        ),
+        (
+            error(messages.BAD_TABLE, request=messages.TABLE_COMMIT, element=4, asked=63, high=42000),
+            "The wristband refused the table of bubble 4 at knot 63: heights must rise to the board's greatest height "
+            "and pressures stay within 42000 Pa.",
+        ),
+        (
+            error(messages.BAD_CRC, request=messages.TABLE_COMMIT),
+            "The wristband refused TABLE_COMMIT: what it received is not what was sent. Upload the tables again.",
+        ),
+        (
+            error(messages.NO_COMMON_PROTOCOL, request=messages.HELLO),
+            "The wristband refused HELLO with error 7.",  # the link has a better sentence for this one
+        ),
+        (
+            error(messages.FAULTED),
+            "The wristband failed at SHOW and vents. `bubbleskin info` counts its exceptions.",
+        ),
+        (error(200), "The wristband refused SHOW with error 200."),
+    ],
+)
+def test_every_refusal_has_its_sentence(received, sentence):
+    assert wire.explain(received) == sentence
+
+
+def test_every_error_of_the_schema_is_explained():
+    explained = {messages.UNKNOWN_MESSAGE, messages.WRONG_LENGTH, messages.OUT_OF_RANGE, messages.WRONG_COUNT}
+    explained |= {messages.BAD_TABLE, messages.BAD_CRC, messages.NO_COMMON_PROTOCOL, messages.FAULTED}
+    assert explained == {code for code, _, _ in messages.ERRORS}
+
+
+def test_no_refusal_however_odd_is_without_a_sentence():
+    rng = random.Random(1)
+    for _ in range(3000):
+        odd = [rng.choice((0, 1, 2, 4, 8, 0x7F, 255, rng.randrange(256))) for _ in range(4)]
+        sentence = wire.explain(error(odd[1], odd[0], odd[2], odd[3], *(rng.randrange(-(2**31), 2**31) for _ in "123")))
+        assert sentence.startswith("The wristband")
+        assert sentence.endswith(".")
+
+
+def test_what_is_no_message_is_counted_and_dropped():
+    frame = wire.encode("PING", 5, (9,))
+    reader = wire.Reader()
+    bad_crc = bytes([frame[0], frame[1] ^ 1, *frame[2:]])
+    assert list(reader.feed(bad_crc)) == []
+    assert reader.bad == 1
+    assert list(reader.feed(b"hello, I am no wristband\r\n\0")) == []
+    assert reader.bad == 2
+    unknown = bytearray(64)
+    framing.put_header(unknown, 0x70, 1)
+    end = framing.seal(
+        unknown, 3, lambda data, start, stop, out, at: out.__setitem__(slice(at, at + 4), crc(data[start:stop]))
+    )
+    assert list(reader.feed(unknown[:end])) == []
+    assert reader.bad == 3
+    assert [message["token"] for message in reader.feed(frame)] == [9]
+    assert reader.bad == 3
+
+
+def test_a_message_in_pieces_is_one_message():
+    frame = wire.encode("STATE_REPLY", 3, (1, 1), [(1, 2, 3, 4, 5)] * 19)
+    reader = wire.Reader()
+    received = [message for byte in frame for message in reader.feed(bytes([byte]))]
+    assert [message.sequence for message in received] == [3]
+
+
+def test_the_host_can_write_and_read_every_message():
+    rng = random.Random(2)
+    for message in codec.BY_ID.values():
+        fixed = [rng.randrange(1, 100) for _ in range(message.fixed_values)]
+        rows = [[rng.randrange(100) for _ in range(message.stride_values)] for _ in range(3 * bool(message.repeated))]
+        (received,) = receive(wire.encode(message.name, 65535, fixed, rows))
+        assert received.id == message.id
+        assert received.sequence == 65535
+        assert list(received.fields) == [field[0] for field in message.fixed]
+        assert all(column.tolist() == [row[at] for row in rows] for at, column in enumerate(received.columns.values()))
