@@ -88,6 +88,7 @@ INTEGRAL_MAX = const(1 << 17)
 READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noise
 STEP_MAX = const(16000)  # 1/16 µm: 1 mm, far more than one period moves a bubble
 NEAR = const(320)  # 1/16 µm: 20 µm, so near to the height last weighed its tangent is good to 0.1 µm
+ROOT_MAX = const(20000)  # 8 Pa: more than any two readings give; from there Newton's next step is a good one
 STEEP_MAX = const(60000)  # Pa/mm
 SIZE_MAX = const(50000)  # µJ, more than any period brings
 SLOPE_MIN = const(256)
@@ -331,6 +332,8 @@ def control(rows, board, pulses):
                     square = (p1 - p2 >> 3) * ((p1 * (256 - 2 * k[CRITICAL]) >> 8) + p2 >> 3)
                 root = s[at + ROOT]
                 root = (root + square // root >> 1) + 1
+                if root > ROOT_MAX:  # far off, as after no pressure at all
+                    root = ROOT_MAX
                 root = (root + square // root >> 1) + 1
                 s[at + ROOT] = root
                 flow = (root * s[at + FLOW_GAIN] >> 12) + 1
