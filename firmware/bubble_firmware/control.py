@@ -114,63 +114,76 @@ def estimate(rows, board, counts, knots):
     count = ptr16(counts)
     knot = ptr16(knots)
     n = k[N]
+    count_low = k[COUNT_LOW]
+    count_high = k[COUNT_HIGH]
+    stride = k[KNOT_STRIDE]
+    p0 = 0
+    p1 = 0
     i = 0
     at = 0
     while i < n:
         c = count[i]
-        lost = 1 if c <= k[COUNT_LOW] or c >= k[COUNT_HIGH] else 0
-        if lost:
-            s[at + LOST] = s[at + LOST] + 1
-        else:
-            s[at + LOST] = 0
-            s[at + PRESSURE] = (c - s[at + ZERO]) * k[PA_PER_COUNT]
+        lost = 0
+        if c <= count_low or c >= count_high:
+            lost = s[at + LOST] + 1
+        s[at + LOST] = lost
         p = s[at + PRESSURE]
+        if lost == 0:
+            p = (c - s[at + ZERO]) * k[PA_PER_COUNT]
+            s[at + PRESSURE] = p
         air = s[at + AIR] + s[at + DOSE]
         slope = s[at + HEIGHT + SLOPE]
-        open_vent = 1 if s[at + STATUS] == RESTING or s[at + STATUS] == FAULT else 0
+        content = s[at + HEIGHT + CONTENT]
+        status = s[at + STATUS]
+        open_vent = 1 if status == RESTING or status == FAULT else 0
         if lost == 0 and (open_vent or s[at + BUSY] <= 0):
             # The height that holds this pressure: in the segment that contains it and is nearest to the
             # estimate's, because a bubble stays on the branch where it was. No segment: beyond an end.
-            begin = i * k[KNOT_STRIDE]
+            begin = i * stride
             end = begin + 2 * (s[at + KNOTS] - 1)
             low = begin + 2 * s[at + HEIGHT + SEGMENT]
             high = low
             found = -1
             while found < 0 and (low >= begin or high < end):
                 if low >= begin:
-                    if (knot[low + 1] <= p and p <= knot[low + 3]) or (knot[low + 3] <= p and p <= knot[low + 1]):
+                    p0 = knot[low + 1]
+                    p1 = knot[low + 3]
+                    if (p0 <= p and p <= p1) or (p1 <= p and p <= p0):
                         found = low
                     low -= 2
                 if found < 0 and high < end:
-                    if (knot[high + 1] <= p and p <= knot[high + 3]) or (knot[high + 3] <= p and p <= knot[high + 1]):
+                    p0 = knot[high + 1]
+                    p1 = knot[high + 3]
+                    if (p0 <= p and p <= p1) or (p1 <= p and p <= p0):
                         found = high
                     high += 2
             if found < 0:
                 measured = knot[end] if p > 0 else knot[begin]
             else:
                 measured = knot[found]
-                rise = knot[found + 3] - knot[found + 1]
-                if rise != 0:
-                    measured += (p - knot[found + 1]) * (knot[found + 2] - knot[found]) // rise
+                if p1 != p0:
+                    measured += (p - p0) * (knot[found + 2] - measured) // (p1 - p0)
             off = measured - (s[at + HEIGHT + WEIGHED] >> 4)
-            trust = s[at + TRUST] + 1
+            means = content + (off * slope >> 8)
             if open_vent:
-                trust = 0
-            elif (off > SURPRISE_UM or off < 0 - SURPRISE_UM) and (
-                p - s[at + HEIGHT + MODEL] > SURPRISE_PA or p - s[at + HEIGHT + MODEL] < 0 - SURPRISE_PA
-            ):
-                trust = 1
-            elif trust > TRUST_MAX:
-                trust = TRUST_MAX
-            s[at + TRUST] = trust
-            air += (s[at + HEIGHT + CONTENT] + (off * slope >> 8) - air) // (4 if trust == 0 else trust)
+                air += (means - air) >> 2
+            else:
+                trust = s[at + TRUST] + 1
+                if off > SURPRISE_UM or off < 0 - SURPRISE_UM:
+                    wrong = p - s[at + HEIGHT + MODEL]
+                    if wrong > SURPRISE_PA or wrong < 0 - SURPRISE_PA:
+                        trust = 1
+                if trust > TRUST_MAX:
+                    trust = TRUST_MAX
+                s[at + TRUST] = trust
+                air += (means - air) // trust
         if air < 0:
             air = 0
         if air > AIR_MAX:
             air = AIR_MAX
         s[at + AIR] = air
         # The height that this air means, along the tangent at the height last weighed.
-        step = (air - s[at + HEIGHT + CONTENT] << 12) // slope
+        step = (air - content << 12) // slope
         if step > STEP_MAX:
             step = STEP_MAX
         if step < 0 - STEP_MAX:
@@ -250,6 +263,11 @@ def control(rows, board, pulses):
     pulse = ptr16(pulses)
     n = k[N]
     tick = k[TICK_US]
+    mode = k[MODE]
+    pressure_max = k[PRESSURE_MAX]
+    settled = k[SETTLED_UM]
+    rest = (k[REST_UM] + k[DEADBAND_UM]) << 4
+    still = 1 if k[RAMP_DONE] == k[RAMP_TICKS] else 0
     i = 0
     at = 0
     while i < n:
@@ -257,25 +275,34 @@ def control(rows, board, pulses):
         filled = s[at + FILL_US]
         vented = s[at + VENT_US]
         energised = filled + vented
-        opens = s[at + OPENS_US]
         closes = s[at + CLOSES_US]
-        s[at + DOSE] = s[at + NEXT]
+        dose = s[at + NEXT]
+        s[at + DOSE] = dose
 
         # Guard. A fault stays until it is cleared.
-        s[at + OVER] = s[at + OVER] + 1 if p > k[PRESSURE_MAX] else 0
-        s[at + FILL_RUN_US] = s[at + FILL_RUN_US] + filled if filled == tick else 0
-        if s[at + OVER] >= READINGS_MIN:
-            s[at + FAULTS] = s[at + FAULTS] | OVERPRESSURE
+        over = 0
+        if p > pressure_max:
+            over = s[at + OVER] + 1
+            if over >= READINGS_MIN:
+                s[at + FAULTS] = s[at + FAULTS] | OVERPRESSURE
+        s[at + OVER] = over
+        run = 0
+        if filled == tick:
+            run = s[at + FILL_RUN_US] + tick
+            if run >= k[FILL_MAX_US]:
+                s[at + FAULTS] = s[at + FAULTS] | VALVE_TIME
+        s[at + FILL_RUN_US] = run
         if s[at + LOST] >= READINGS_MIN:
             s[at + FAULTS] = s[at + FAULTS] | SENSOR_LOST
-        if s[at + FILL_RUN_US] >= k[FILL_MAX_US]:
-            s[at + FAULTS] = s[at + FAULTS] | VALVE_TIME
 
         # When will the line be quiet, seen from the start of the next period?
+        busy = s[at + BUSY]
         if energised:
-            s[at + BUSY] = energised + closes + k[QUIET_US] - tick
-        elif s[at + BUSY] > 0:
-            s[at + BUSY] = s[at + BUSY] - tick
+            busy = energised + closes + k[QUIET_US] - tick
+            s[at + BUSY] = busy
+        elif busy > 0:
+            busy -= tick
+            s[at + BUSY] = busy
 
         # A valve energised to the end of this period closes its dead time into the next: that air comes anyway.
         tail = 0
@@ -286,12 +313,12 @@ def control(rows, board, pulses):
 
         fill = 0
         vent = 0
-        dose = tail
         aim = s[at + SETPOINT + CONTENT]
-        ahead = aim - s[at + AIM]  # what the setpoint's own motion asks for: feed-forward
-        error = s[at + AIM] - s[at + AIR] - s[at + DOSE] - tail
-        resting = 1 if s[at + SETPOINT] <= (k[REST_UM] + k[DEADBAND_UM]) << 4 else 0
-        if s[at + FAULTS] or k[MODE] == VENTED or (k[MODE] == ACTIVE and resting):
+        before = s[at + AIM]
+        ahead = aim - before  # what the setpoint's own motion asks for: feed-forward
+        error = before - s[at + AIR] - dose - tail
+        dose = tail
+        if s[at + FAULTS] or mode == VENTED or (mode == ACTIVE and s[at + SETPOINT] <= rest):
             s[at + STATUS] = FAULT if s[at + FAULTS] else RESTING
             vent = tick
             dose = 0
@@ -300,14 +327,13 @@ def control(rows, board, pulses):
             s[at + INTEGRAL] = 0
             s[at + TRUST] = 0
             s[at + FLOW] = 0
-        elif k[MODE] != ACTIVE:
+        elif mode != ACTIVE:
             s[at + STATUS] = STOPPED
             aim = s[at + AIR]
             error = 0
         else:
             off = s[at + TARGET] - (s[at + HEIGHT] >> 4)
-            still = 1 if k[RAMP_DONE] == k[RAMP_TICKS] else 0
-            near = 1 if off <= k[SETTLED_UM] and off >= 0 - k[SETTLED_UM] else 0
+            near = 1 if off <= settled and off >= 0 - settled else 0
             s[at + STATUS] = SETTLED if near and still and s[at + TRUST] > 1 else MOVING
             band = s[at + SETPOINT + SLOPE] * k[DEADBAND_UM] >> 8
             enough = 1 if ahead == 0 and error <= band and error >= 0 - band else 0
@@ -320,7 +346,7 @@ def control(rows, board, pulses):
 
                 # Flow of a restrictor below its critical ratio (ISO 6358): C p1 sqrt(1 - ((p2/p1 - b)/(1 - b))²)
                 # = C/(1 - b) sqrt((p1 - p2) (p2 + (1 - 2b) p1)). The root by Newton from the last one.
-                lost = k[TUBE] * s[at + FLOW] >> 4 if s[at + BUSY] <= 0 else 0
+                lost = k[TUBE] * s[at + FLOW] >> 4 if busy <= 0 else 0
                 if fills:
                     p1 = k[SUPPLY] + ATMOSPHERE
                     p2 = p + lost + ATMOSPHERE
@@ -343,7 +369,7 @@ def control(rows, board, pulses):
                 if size > SIZE_MAX:
                     size = SIZE_MAX
                 opened = 1 if (fills and filled == tick) or (fills == 0 and vented == tick) else 0
-                delay = 0 if opened else opens - closes
+                delay = 0 if opened else s[at + OPENS_US] - closes
                 width = size * 16000 // flow + delay
                 if width > tick - k[PULSE_MIN_US]:  # too short a gap to close in
                     width = tick if width > tick - (k[PULSE_MIN_US] >> 1) else tick - k[PULSE_MIN_US]

@@ -12,20 +12,20 @@ from rich.table import Table
 from bubbleskin.bench.rows import Row
 from bubbleskin.cli.options import as_json
 
-_PARTS = {"simulation": "how fast simulated wristbands run"}
+_PARTS = ("simulation", "membrane")
 
 
 @click.command()
-@click.argument("parts", nargs=-1, type=click.Choice(list(_PARTS)), metavar="[PART]...")
+@click.argument("parts", nargs=-1, type=click.Choice(_PARTS), metavar="[PART]...")
 @as_json
 def bench(parts: tuple[str, ...], json: bool) -> None:
     """Measure speeds and print them beside their targets.
 
-    PART is one or more of: simulation. Without one, all are measured.
+    PART: simulation (how fast simulated wristbands run) or membrane (inversions, tables, fits). Without one, all.
     """
     console = Console(stderr=json)
     rows: list[Row] = []
-    for part in track(parts or list(_PARTS), "measuring", console=console, transient=True):
+    for part in track(parts or _PARTS, "measuring", console=console, transient=True):
         measure: Callable[[], list[Row]] = import_module(f"bubbleskin.bench.{part}").rows
         rows += measure()
     if json:

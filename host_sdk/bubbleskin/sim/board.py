@@ -128,6 +128,8 @@ class SimulatedBoard:
         self._pump = 0.0
         self._dump = False
         self._counts = array("H", bytes(2 * (n + 1)))
+        self._bubble_counts = np.frombuffer(self._counts, np.uint16)[:n]  # the same memory
+        self._decided: array | None = None  # what `pulses` were made from
         self._owed = 0.0
 
     @property
@@ -149,15 +151,17 @@ class SimulatedBoard:
 
     def tick(self) -> None:
         """One period: the firmware reads the sensors and decides, while the plant goes on as decided before."""
-        self._counts[:-1] = array("H", self.plant.sense().tobytes())
+        self._bubble_counts[:] = self.plant.sense()
         self._counts[-1] = self.plant.sense_supply()
         link = bytes(self.to_device[:LINK_IN])
         del self.to_device[:LINK_IN]
         outputs = self.firmware.tick(self._counts, link)
         self.plant.advance(self.tick_s, self.pulses[:, 0], self.pulses[:, 1], self._pump, self._dump)
         self.from_device += outputs.link
-        pulses = np.frombuffer(outputs.pulses, np.uint16).reshape(-1, 2)
-        np.minimum(pulses * 1e-6, self.tick_s, out=self.pulses)
+        if outputs.pulses != self._decided:
+            self._decided = outputs.pulses
+            pulses = np.frombuffer(outputs.pulses, np.uint16).reshape(-1, 2)
+            np.minimum(pulses * 1e-6, self.tick_s, out=self.pulses)
         self._pump = outputs.pump / 65535
         self._dump = outputs.dump
 
