@@ -1,0 +1,171 @@
+"""The same readings and the same bytes of the link give the same commands, bit for bit, here and on MicroPython."""
+
+import random
+import zlib
+from array import array
+
+import numpy as np
+import pytest
+
+from bubble_firmware import boards
+from bubble_firmware.nominal import KNOTS
+from bubble_protocol import messages
+from bubbleskin.link import wire
+from bubbleskin.sim import SimulatedBoard
+from bubbleskin.sim.board import InProcessFirmware
+from bubbleskin.sim.micropython import MicroPythonFirmware
+
+BOOT_ID = 0x87654321
+
+
+class Recorder:
+    """A `Firmware` that keeps what another is given and what it decides."""
+
+    def __init__(self, firmware):
+        self.firmware = firmware
+        self.given = []
+        self.decided = []
+
+    def tick(self, counts, link):
+        self.given.append((array("H", counts), link))
+        self.decided.append(self.firmware.tick(counts, link))
+        return self.decided[-1]
+
+    def close(self):
+        self.firmware.close()
+
+
+def show(sequence, over_ms, heights):
+    return wire.encode("SHOW", sequence, (over_ms,), [(height,) for height in heights])
+
+
+def script(n):
+    """(seconds, what the host sends): shapes below, on and above the plateau, quick and slow, and every request but INFO."""
+    chance = random.Random(3)
+
+    def shape(low, high):
+        return [chance.randrange(low, high) for _ in range(n)]
+
+    snaps_through = [(5000, 0), (7000, 24000), (8000, 23500), (9000, 25000), (14000, 41000)]
+    tables = zlib.crc32(
+        b"".join(np.array(table, "<u2").tobytes() for table in [KNOTS, snaps_through, *[KNOTS] * (n - 2)])
+    )
+    return [
+        (0.00, b"\xff\x00" + wire.encode("HELLO", 1, (1, 1)) + wire.encode("SUBSCRIBE", 2, (4,))),
+        (0.05, show(3, 0, shape(5500, 12500))),
+        (1.00, wire.encode("STATE", 4) + wire.encode("PING", 5, (0xFEDCBA98,))),
+        (1.20, show(6, 500, shape(7000, 9000))),
+        (2.40, show(7, 0, shape(9000, 14000))),
+        (3.20, wire.encode("STOP", 8)),
+        (3.70, show(9, 0, [5000, *shape(6000, 9500)[1:]])),
+        (4.40, b"\x07garbage\x00" + wire.encode("PING", 10, (1,))[:-3]),
+        (
+            4.50,
+            b"\0" + wire.encode("TABLE_WRITE", 11, (1, 0, 5), snaps_through) + wire.encode("TABLE_COMMIT", 12, (123,)),
+        ),
+        (4.60, wire.encode("TABLE_COMMIT", 13, (tables,)) + wire.encode("TABLE_READ", 14, (1, 0))),
+        (4.90, wire.encode("VENT", 15)),
+        (5.50, show(16, 0, [15000] * n) + show(17, 0, [9000] * (n - 1))),
+        (5.60, show(18, 1000, shape(10000, 14000))),
+        (8.00, wire.encode("CLEAR", 19) + show(20, 0, shape(5000, 14000))),
+        (9.50, show(21, 60000, [0] * n)),
+    ]
+
+
+FAULTS = [
+    (6.8, "sensor_absent", 2, 1.0),
+    (7.2, "sensor_absent", 2, 0.0),
+    (7.0, "pop_off", 3, 1.0),
+    (7.8, "pop_off", 3, 0.0),
+]
+
+
+@pytest.fixture(params=["wristband7", "wristband19"])
+def trace(request):
+    """10 s of a wristband whose bubbles differ: the board's data, what came into the firmware and what it decided."""
+    board = SimulatedBoard(request.param, seed=BOOT_ID - 1, spread=0.1)
+    board.firmware = recorder = Recorder(board.firmware)
+    due = [(time, board.to_device.extend, (sent,)) for time, sent in script(board.data.BUBBLES)]
+    due += [(time, board.inject, fault) for time, *fault in FAULTS]
+    due.sort(key=lambda entry: entry[0])
+    while board.time < 10 - 1e-9:
+        while due and board.time >= due[0][0] - 1e-9:
+            _, do, arguments = due.pop(0)
+            do(*arguments)
+        board.tick()
+    return board.data, recorder.given, recorder.decided
+
+
+def replay(firmware, given):
+    try:
+        return [firmware.tick(array("H", counts), link) for counts, link in given]
+    finally:
+        firmware.close()
+
+
+def assert_same(decided, again):
+    """Pulses, pump, dump and bytes of the link, tick by tick."""
+    for tick, (one, other) in enumerate(zip(decided, again, strict=True)):
+        assert one == other, f"tick {tick}"
+
+
+@pytest.mark.usefixtures("micropython")  # to be skipped or to fail where there is none
+def test_a_recorded_trace_replays_bit_for_bit(trace):
+    data, given, decided = trace
+    assert len(given) == 10_000_000 // data.TICK_US
+    assert_same(decided, replay(InProcessFirmware(data, BOOT_ID), given))
+    assert_same(decided, replay(MicroPythonFirmware(data, BOOT_ID), given))
+
+    # The trace is one that says something: every answer, both kinds of valves on every bubble, faults.
+    heard = list(wire.Reader().feed(b"".join(outputs.link for outputs in decided)))
+    telemetry = [message for message in heard if message.id == messages.TELEMETRY]
+    assert {message.sequence for message in heard if message.id != messages.TELEMETRY} == set(range(1, 22)) - {10}
+    assert len(telemetry) > 10_000_000 // data.TICK_US // 4 - 5
+    pulses = np.array([outputs.pulses for outputs in decided]).reshape(len(decided), -1, 2)
+    doses = (pulses > 0) & (pulses < data.TICK_US)
+    assert (doses[:, :, 0].sum(axis=0) > 10).all()
+    assert doses[:, :, 1].sum() > 100
+    assert {message.id for message in heard} >= {messages.TABLE_COMMIT | messages.REPLY, messages.ERROR}
+    assert {fault for message in telemetry for fault in message.columns["faults"]} >= {0, messages.SENSOR_LOST}
+
+
+def hostile(seed, board, ticks):
+    """Readings that jump over the whole range, and any table and shape that the firmware takes."""
+    chance = random.Random(seed)
+    n = board.BUBBLES
+    tables = [list(KNOTS)] * n
+    for tick in range(ticks):
+        if tick % 30 == 0:
+            base = [chance.choice([0, 160, 1400, 2630, 4095, chance.randrange(4096)]) for _ in range(n + 1)]
+            noise = chance.choice([1, 5, 60, 600])
+        link = b""
+        if tick % 100 == 0:
+            bubble = chance.randrange(n)
+            heights = sorted(chance.sample(range(1, 14000), chance.randrange(1, 50)))
+            last = chance.randrange(14000, 16001)
+            tables[bubble] = [
+                (height, chance.choice([0, 42000, chance.randrange(42001)])) for height in [*heights, last]
+            ]
+            link = wire.encode("TABLE_WRITE", tick, (bubble, 0, len(tables[bubble])), tables[bubble])
+        elif tick % 100 == 1:
+            crc = zlib.crc32(b"".join(np.array(table, "<u2").tobytes() for table in tables))
+            link = wire.encode("TABLE_COMMIT", tick, (crc,))
+        elif tick % 40 == 2:
+            over_ms = chance.choice([0, 200, chance.randrange(60001)])
+            link = wire.encode("CLEAR", tick) + show(tick, over_ms, [chance.randrange(14001) for _ in range(n)])
+        elif tick % 100 == 50:
+            link = wire.encode(chance.choice(["STOP", "VENT", "STATE"]), tick)
+        counts = [max(0, min(4095, level + chance.randint(-noise, noise))) for level in base]
+        yield array("H", counts), link
+
+
+@pytest.mark.usefixtures("micropython")
+@pytest.mark.parametrize("seed", range(3))
+def test_what_no_plant_would_do_is_computed_the_same(seed):
+    data = boards.load("wristband7")
+    given = list(hostile(seed, data, 3000))
+    decided = replay(InProcessFirmware(data, BOOT_ID), given)
+    assert_same(decided, replay(MicroPythonFirmware(data, BOOT_ID), given))
+    heard = list(wire.Reader().feed(b"".join(outputs.link for outputs in decided)))
+    assert not [message for message in heard if message.id == messages.ERROR]
+    assert len({tuple(outputs.pulses) for outputs in decided}) > 300
