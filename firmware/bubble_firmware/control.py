@@ -89,7 +89,7 @@ READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noi
 STEP_MAX = const(16000)  # 1/16 µm: 1 mm, far more than one period moves a bubble
 NEAR = const(320)  # 1/16 µm: 20 µm, so near to the height last weighed its tangent is good to 0.1 µm
 ROOT_MAX = const(20000)  # 8 Pa: more than any two readings give; from there Newton's next step is a good one
-STEEP_MAX = const(60000)  # Pa/mm
+STEEP_MAX = const(50000)  # Pa/mm: more, and the slope of the air of a bubble of 16 mm is beyond 32 bits
 SIZE_MAX = const(50000)  # µJ, more than any period brings
 SLOPE_MIN = const(256)
 
