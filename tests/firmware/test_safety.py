@@ -5,6 +5,7 @@ import random
 import pytest
 
 from bubble_protocol import messages
+from bubbleskin.link import wire
 
 WRONG_READINGS = 2  # in a row that make a fault; one alone is noise
 HELD_PA, HELD_UM = 22609, 10008  # a knot of the nominal table
@@ -137,8 +138,10 @@ def test_no_fill_valve_is_ever_open_for_longer_than_allowed(rig7, seed):
     for tick in range(3000):
         if tick % 200 == 0:
             heights = [chance.choice([5000, 8000, 14000, chance.randrange(14001)]) for _ in range(board.BUBBLES)]
-            rig7.show(*heights, over_ms=chance.choice([0, 0, 500]))
-            rig7.ask("CLEAR")
+            rig7.hands.to_device += wire.encode(
+                "SHOW", 1, (chance.choice([0, 0, 500]),), [(height,) for height in heights]
+            )
+            rig7.hands.to_device += wire.encode("CLEAR", 2)
             rig7.hands.counts[-1] = chance.choice([160, 500, 2560, 4000])
         if tick % 50 == 0:
             for bubble in range(board.BUBBLES):
