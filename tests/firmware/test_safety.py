@@ -143,9 +143,6 @@ def test_no_fill_valve_is_ever_open_for_longer_than_allowed(rig7, seed):
             )
             rig7.hands.to_device += wire.encode("CLEAR", 2)
             rig7.hands.counts[-1] = chance.choice([160, 500, 2560, 4000])
-            # The requests took ticks of their own: of what came before, only what is open now is known.
-            now = [rig7.pulse(bubble)[0] for bubble in range(board.BUBBLES)]
-            stretch = [fill if fill == board.TICK_US else 0 for fill in now]
         if tick % 50 == 0:
             for bubble in range(board.BUBBLES):
                 rig7.sense(bubble, chance.choice([0, 0, 5000, 21000, 35000, chance.randrange(42000)]))
