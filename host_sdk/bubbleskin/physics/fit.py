@@ -255,7 +255,7 @@ def finish(
     notes: tuple[str, ...] = (),
 ) -> YeohFit:
     """Gather what is known about a fitted bubble."""
-    residuals = points.pressure - shape.basis(points.height)[0] @ theta
+    residuals = points.pressure - shape.basis(shape.at_least(points.height))[0] @ theta
     return YeohFit(
         shape.balloon(theta),
         Parameters(*(float(v) for v in theta)),

@@ -50,6 +50,10 @@ class Shape:
         """Height (m) without pressure."""
         return 2 * walls.rest_radii(self.thickness, self.radius, self.wall, self.surface)[1]
 
+    def at_least(self, height: np.ndarray) -> np.ndarray:
+        """Heights kept where the formulas hold: noise may put a point a little below rest, not into the wall."""
+        return np.maximum(height, 0.97 * self.rest_height)
+
     def basis(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂P/∂θ and ∂²P/∂θ∂h at ``height`` (m), each (n, 3): the model is P = basis · θ."""
         sizes = (self.thickness, self.radius, self.wall, self.surface)
@@ -103,6 +107,13 @@ class Solution(NamedTuple):
 def start(shape: Shape, points: Points) -> np.ndarray:
     """The paper's material scaled by the median of measured over expected pressure."""
     theta = np.array([YeohBalloon.mu, YeohBalloon.c2, YeohBalloon.c3])
+    sunk = points.height < 0.9 * shape.rest_height
+    if sunk.any():
+        k = int(np.argmax(sunk))
+        raise InvalidInput(
+            f"point {k} is {points.height[k] * 1e3:g} mm tall, but a bubble of this diameter is "
+            f"{shape.rest_height * 1e3:g} mm tall at rest: check the units, the diameter, and of which surface it is."
+        )
     lifted = points.height > 1.05 * shape.rest_height
     if not lifted.any():
         raise InvalidInput(
@@ -121,14 +132,13 @@ def project(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) ->
 
     ``theta`` is (3,) for points of one curve, (n, 3) if each point has its own.
     """
-    low = 0.97 * shape.rest_height
     for _ in range(3):
         basis, slopes = shape.basis(eta)
         P, dP = (basis * theta).sum(axis=1), (slopes * theta).sum(axis=1)
         gradient = (eta - points.height) / points.height_sd**2 + (P - points.pressure) * dP / points.pressure_sd**2
         curvature = 1 / points.height_sd**2 + (dP / points.pressure_sd) ** 2
         step = np.clip(gradient / curvature, -0.1 * shape.rest_height, 0.1 * shape.rest_height)
-        eta = np.maximum(eta - step, low)
+        eta = shape.at_least(eta - step)
     return eta
 
 
@@ -195,7 +205,7 @@ def kept_scale(residuals: np.ndarray, weights: np.ndarray, fitted: float = 3) ->
 
 def regress(shape: Shape, points: Points, *, robust: bool) -> Solution:
     """Fit θ to ``points``: near by Huber's weights, nearer by bisquare ones, then without the outliers."""
-    theta, eta = start(shape, points), points.height
+    theta, eta = start(shape, points), shape.at_least(points.height)
     weights, scale = np.ones(len(points)), 1.0
     for stage in ("huber", "bisquare", "trim") if robust else ("plain",):
         for _ in range(PASSES):

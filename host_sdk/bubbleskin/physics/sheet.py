@@ -201,7 +201,7 @@ class _Sheet:
         self.count = int(index.max()) + 1
         self.of = (index == np.arange(self.count)[:, None]).astype(float)
         self.unit = start(shape, points)
-        self.eta = points.height
+        self.eta = shape.at_least(points.height)
         self.supposed = np.full((3, 3), STIFFNESS_SPREAD**2) + SHAPE_SPREAD**2 * np.eye(3)
         self.mean, self.spread = np.ones(3), 4 * self.supposed
         self.phi = np.ones((self.count, 3))
