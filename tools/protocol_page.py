@@ -114,7 +114,7 @@ def allowed(field: Field) -> str:
 
 def layout(fields: Sequence[Field], start: int, each: str) -> list[tuple[object, ...]]:
     """Rows of the table of some fields."""
-    rows = []
+    rows: list[tuple[object, ...]] = []
     for name, kind, unit, low, high, meaning in fields:
         field = (name, kind, unit, low, high, meaning)
         rows.append((f"{each}{start}", f"`{name}`", messages.KIND_NAMES[kind], unit, allowed(field), meaning))
