@@ -76,15 +76,17 @@ def test_telemetry_keeps_its_rate_by_the_devices_clock(skin, rate_hz):
 
 def test_telemetry_and_requests_share_the_link(skin):
     times, asked = [], []
-    for number, state in enumerate(skin.telemetry(20)):
+    for number, state in enumerate(skin.telemetry(50)):
         times.append(state.time)
-        asked.append(skin.state().time)
+        if number < 20:
+            skin.sleep(0.03)  # some telemetry waits while a request has its reply
+            asked.append(skin.state().time)
         if number == 5:
             skin.show(np.full(skin.info.bubbles, 10.0), wait=False)
-        if number == 30:
+        if number == 60:
             break
-    assert np.diff(times) == pytest.approx(0.05, abs=1e-6)
-    assert all(0 <= one - other < 0.2 for one, other in zip(asked, times, strict=True))
+    assert np.diff(times) == pytest.approx(0.02, abs=1e-6)
+    assert np.diff(asked).min() >= 0.03
     assert state.mode == "active"
     assert state.height_mm == pytest.approx(10, abs=0.3)
 

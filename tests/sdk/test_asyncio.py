@@ -71,9 +71,9 @@ def test_telemetry_and_show_side_by_side(url):
             watching.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await watching
-            before = len(seen)
+            skin._link.telemetry.clear()
             await skin.sleep(0.2)
-            assert len(seen) == before
+            assert not skin._link.telemetry, "the device was told to send no more"
         assert np.diff([state.time for state in seen]) == pytest.approx(0.02)
         assert {9.5, 11.0, 10.0} <= {float(state.target_mm[0]) for state in seen}
 
@@ -118,6 +118,28 @@ def test_a_cancelled_call_leaves_the_link_usable(url, patience):
                 assert len(state.status) == 7
             state = await skin.show(np.full(7, 10.0))
             assert state.height_mm == pytest.approx(10, abs=0.2)
+
+    run(script())
+
+
+def test_a_cancelled_wait_loses_nothing_of_what_others_wait_for(url):
+    async def script():
+        times = []
+
+        async def watch(skin):
+            async for state in skin.telemetry(50):
+                times.append(state.time)
+
+        async with await bs.aconnect(url) as skin:
+            watching = asyncio.create_task(watch(skin))
+            for _ in range(40):
+                waiting = asyncio.create_task(skin.sleep(1.0))
+                await asyncio.sleep(0.013)
+                waiting.cancel()
+            watching.cancel()
+            await asyncio.gather(watching, waiting, return_exceptions=True)
+        assert len(times) > 10
+        assert np.diff(times) == pytest.approx(0.02)
 
     run(script())
 

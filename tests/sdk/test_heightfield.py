@@ -62,7 +62,7 @@ def test_a_flat_field_at_a_limit_is_within_it(limit):
     """Interpolation between equal entries can be off in the last digit."""
     for rows in range(1, 12):
         for columns in range(1, 30):
-            taken = sample(np.full((rows, columns), limit), HEX, MAX_MM)
+            taken = sample(np.full((rows, columns), limit), bs.Layout.hexagon(3), MAX_MM)
             assert (taken >= 0).all()
             assert (taken <= MAX_MM).all()
 
