@@ -1,14 +1,13 @@
 """Write `bubble_firmware/nominal.py`: the table that a board without calibration uses.
 
-    python tools/nominal_table.py            # write it
-    python tools/nominal_table.py --check    # fail if it is not what would be written
+python tools/nominal_table.py            # write it
+python tools/nominal_table.py --check    # fail if it is not what would be written
 """
 
 from pathlib import Path
 
-import generated
-
 import bubbleskin as bs
+import generated
 
 PATH = Path("firmware/bubble_firmware/nominal.py")
 
