@@ -381,9 +381,7 @@ def micropython(checkout: Path | None = None, *, force: bool = False) -> Path:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--micropython", metavar="DIR", type=Path, help="build your own checkout instead")
     parser.add_argument("--force", action="store_true", help="build even if there is a build already")
     parser.add_argument("--print", action="store_true", help="print nothing but the interpreter's path")

@@ -77,9 +77,7 @@ def test_only_the_debian_archive_is_turned_to_the_other_suite(stanzas):
 
 def test_a_key_written_into_the_sources_file_is_kept():
     text = DEB822.replace("/usr/share/keyrings/archive.gpg", "\n -----BEGIN\n .\n mQIN\n -----END", 1)
-    assert "Signed-By: \n -----BEGIN\n .\n mQIN\n -----END\n" in tool.turn_to_suite(
-        tool.read_deb822(text), "trixie"
-    )
+    assert "Signed-By: \n -----BEGIN\n .\n mQIN\n -----END\n" in tool.turn_to_suite(tool.read_deb822(text), "trixie")
 
 
 def test_a_source_without_a_key_gets_debians_own(monkeypatch, tmp_path):
