@@ -42,9 +42,7 @@ def exercise(plant, seconds=1.0, seed=1):
     rng, n, heights = np.random.default_rng(seed), len(plant.parameters.mu), []
     for k in range(round(seconds / TICK)):
         up = k * TICK < seconds / 2
-        fill, vent = (
-            rng.uniform(0, TICK, (2, n)) * rng.random((2, n)).round() * ([[1], [0.3]] if up else [[0.3], [1]])
-        )
+        fill, vent = rng.uniform(0, TICK, (2, n)) * rng.random((2, n)).round() * ([[1], [0.3]] if up else [[0.3], [1]])
         plant.advance(TICK, fill, vent, pump=rng.random())
         heights.append(plant.height_mm)
     return np.array(heights)
