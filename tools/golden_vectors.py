@@ -10,7 +10,7 @@ that they test.
 import json
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import generated
@@ -47,7 +47,7 @@ def value(field: Field, case: str, number: int) -> int | str:
     return low if case == "least" else high
 
 
-def repetitions(fixed: list[Field], group: list[Field], case: str) -> int:
+def repetitions(fixed: Sequence[Field], group: Sequence[Field], case: str) -> int:
     """None, one per bubble, as many as a frame holds."""
     if not group or case == "least":
         return 0
@@ -55,7 +55,7 @@ def repetitions(fixed: list[Field], group: list[Field], case: str) -> int:
     return EXAMPLE_BUBBLES if case == "example" else room // struct.calcsize(layout(group))
 
 
-def layout(fields: list[Field]) -> str:
+def layout(fields: Sequence[Field]) -> str:
     """The struct format of some fields."""
     return "<" + "".join(FORMATS[field[1]] for field in fields)
 
