@@ -159,6 +159,17 @@ def test_plateau_alone_is_doubted():
     assert fit.notes[0] in fit.report()
 
 
+def test_a_range_too_short_for_its_noise_is_doubted():
+    measured, _ = one_bubble(0, heights_mm=(5.5, 8.8), settings=10, repeats=1)
+    with pytest.warns(IdentifiabilityWarning, match=r"Measure above 10\.5 mm"):
+        fit_yeoh(measured.height, measured.pressure)
+    measured, _ = simulate_sheet(3, heights_mm=(7.0, 9.0), settings=5, repeats=1)
+    with pytest.warns(IdentifiabilityWarning, match="bubbles 0, 1, 2: the heights measured"):
+        sheet = fit_sheet(measured.bubble, measured.height, measured.pressure)
+    assert all(fit.notes for fit in sheet.values())
+    assert sheet.report().count("note: bubble") == 3
+
+
 def test_good_data_is_not_doubted():
     for seed in range(20):
         measured, _ = one_bubble(seed, settings=12, repeats=1)
