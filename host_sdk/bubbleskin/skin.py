@@ -17,6 +17,7 @@ from bubbleskin.records import Health, Info, State
 from bubbleskin.shape.heightfield import Heights, sample
 
 if TYPE_CHECKING:
+    from bubbleskin.physics.calibration import Calibration
     from bubbleskin.physics.table import Table
     from bubbleskin.sim.board import SimulatedBoard
 
@@ -143,9 +144,15 @@ class AsyncSkin:
         """See `Skin.clear_faults`."""
         await self._link.call("CLEAR")
 
-    async def upload_tables(self, tables: "Sequence[Table] | Table") -> None:
+    async def upload_tables(self, tables: "Sequence[Table] | Table | Calibration") -> None:
         """See `Skin.upload_tables`."""
+        from bubbleskin.physics.calibration import Calibration
+
         n = self.info.bubbles
+        if isinstance(tables, Calibration):
+            if tables.board != self.info.board:
+                raise InvalidInput(f"The calibration is of a {tables.board}; this is a {self.info.board}.")
+            tables = tables.tables
         each = list(tables) if isinstance(tables, Sequence) else [tables] * n
         if len(each) != n:
             raise InvalidInput(f"{len(each)} tables for {n} bubbles: give one per bubble, or one for all.")
@@ -266,8 +273,11 @@ class Skin:
         """Forget all faults; a bubble that still has one faults again."""
         drive(self._skin.clear_faults())
 
-    def upload_tables(self, tables: "Sequence[Table] | Table") -> None:
-        """Use other height to pressure tables: one per bubble in layout order, or one for all; all or none are taken."""
+    def upload_tables(self, tables: "Sequence[Table] | Table | Calibration") -> None:
+        """Use other height to pressure tables, until the device restarts; all or none are taken.
+
+        `tables`: one per bubble in layout order, one for all, or a calibration of this kind of board.
+        """
         drive(self._skin.upload_tables(tables))
 
     def read_tables(self) -> "list[Table]":

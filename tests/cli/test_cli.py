@@ -149,3 +149,16 @@ def test_sim_serves_other_programs_until_it_is_interrupted():
             _, err = server.communicate(timeout=20)
     assert server.returncode == 130
     assert err.strip() == "Stopped."
+
+
+def test_tables_go_to_the_wristband_and_come_back(run, tmp_path):
+    theirs, ours, mixed = (str(tmp_path / name) for name in ("theirs.toml", "ours.toml", "mixed.toml"))
+    assert run("table", "--preset", "paper", "--mu-kpa", "45", "-o", ours, "--upload", *SIM)[0] == 0
+    assert run("table", "--from-device", "-o", theirs, *SIM)[0] == 0  # a new simulation: the nominal tables
+    status, out, _ = run("table", "--show", theirs, "--compare", ours)
+    assert status == 1
+    assert "bubble 6" in out
+    assert_one_sentence(run("table", "--show", theirs, "--from-device", *SIM), 2, "one place")
+    wrong = run("table", "--board", "wristband19", "--bubbles", "19", "-o", mixed, "--upload", *SIM)
+    assert wrong[0] == 2
+    assert "this is a wristband7" in wrong[2]

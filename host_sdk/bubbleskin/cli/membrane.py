@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from bubbleskin.cli.options import device
+from bubbleskin.connect import connect
 from bubbleskin.errors import InvalidInput
 
 if TYPE_CHECKING:  # physics and plot load scipy and matplotlib, so a verb imports them when it runs
@@ -98,19 +100,33 @@ def fit(
 @table_options
 @click.option("--data", type=DATA, help="Fit this CSV file first and make a table per bubble.")
 @click.option("--show", type=DATA, help="Read a calibration file instead of making one.")
+@click.option("--from-device", is_flag=True, help="Read the tables that the wristband uses instead of making some.")
 @click.option("--compare", type=DATA, help="Say how this other calibration file differs; status 1 if so.")
 @click.option("--bubbles", type=int, default=7, show_default=True, help="How many equal tables to make.")
 @click.option("-o", "--output", type=DATA, help="Write a calibration file.")
+@click.option("--upload", is_flag=True, help="Let the wristband use these tables, until it restarts.")
+@device
 @json_option
 def table(
-    board: str, knots: int, up_to_mm: float, data: Path | None, show: Path | None, compare: Path | None,
-    bubbles: int, output: Path | None, as_json: bool, preset: str, **options: Any,
+    board: str, knots: int, up_to_mm: float, data: Path | None, show: Path | None, from_device: bool,
+    compare: Path | None, bubbles: int, output: Path | None, upload: bool, device: str | None, as_json: bool,
+    preset: str, **options: Any,
 ) -> None:  # fmt: skip
-    """Make the tables that the firmware runs on: height to pressure, one per bubble."""
+    """Make the tables that the firmware runs on: height to pressure, one per bubble.
+
+    They come from a preset, from --data, from a file (--show) or from a wristband (--from-device).
+    """
     from bubbleskin.physics import Calibration
 
+    if (show is not None) + (data is not None) + from_device > 1:
+        raise InvalidInput("The tables can come from one place: --data, --show or --from-device.")
     if show:
         calibration = Calibration.load(show)
+    elif from_device:
+        with connect(device) as skin:
+            calibration = Calibration(
+                skin.info.board, tuple(skin.read_tables()), f"read from {device or 'the wristband'}"
+            )
     elif data:
         sizes = {key: options[key] for key in ("wall", "thickness_mm", "diameter_mm", "diameter_is")}
         measurements, found = _fit(data, **sizes)
@@ -122,6 +138,10 @@ def table(
     if output:
         calibration.save(output)
         click.echo(f"wrote {output}", err=True)
+    if upload:
+        with connect(device) as skin:
+            skin.upload_tables(calibration)
+        click.echo(f"{calibration.board} uses these tables, CRC {calibration.crc32:08x}, until it restarts", err=True)
     if compare:
         differences = calibration.differences(Calibration.load(compare))
         click.echo("\n".join(differences) or "no difference")
