@@ -18,14 +18,35 @@ from bubbleskin.records import Health, Info, State
 from bubbleskin.skin import AsyncSkin, Skin
 
 if TYPE_CHECKING:
-    from bubbleskin.physics import Table, YeohBalloon, build_table
+    from bubbleskin.physics import (
+        Calibration,
+        Table,
+        YeohBalloon,
+        YeohFit,
+        build_table,
+        fit_sheet,
+        fit_yeoh,
+        preset,
+        read_csv,
+    )
 
 # The physics takes scipy, which takes a second to import; a script that only shows heights need not wait for it.
-_PHYSICS = ("Table", "YeohBalloon", "build_table")
+_PHYSICS = (
+    "Calibration",
+    "Table",
+    "YeohBalloon",
+    "YeohFit",
+    "build_table",
+    "fit_sheet",
+    "fit_yeoh",
+    "preset",
+    "read_csv",
+)
 
 __all__ = [
     "AsyncSkin",
     "BubbleskinError",
+    "Calibration",
     "DeviceFault",
     "DeviceRefused",
     "DeviceSilent",
@@ -39,9 +60,14 @@ __all__ = [
     "Table",
     "WrongDevice",
     "YeohBalloon",
+    "YeohFit",
     "aconnect",
     "build_table",
     "connect",
+    "fit_sheet",
+    "fit_yeoh",
+    "preset",
+    "read_csv",
 ]
 
 
