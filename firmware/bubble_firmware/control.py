@@ -80,8 +80,8 @@ BOARD = const(23)
 
 ATMOSPHERE = const(101325)
 AIR_MAX = const(400000)  # more than any bubble of 16 mm holds: keeps every product below within 32 bits
-TRUST_MAX = const(16)
-TRUST_DOSED = const(4)  # left after a short dose
+TRUST_MAX = const(64)
+TRUST_DOSED = const(16)  # left after a short dose, which is metered well
 SURPRISE_UM = const(500)  # further off than metering ever is,
 SURPRISE_PA = const(500)  # by more than noise: believe the sensor afresh
 INTEGRAL_MAX = const(1 << 17)
@@ -176,7 +176,7 @@ def estimate(rows, board, counts, knots):
                 if trust > TRUST_MAX:
                     trust = TRUST_MAX
                 s[at + TRUST] = trust
-                air += (means - air) // trust
+                air += (means - air + (trust >> 1)) // trust  # rounded: a bias would add up over so many
         if air < 0:
             air = 0
         if air > AIR_MAX:
