@@ -1,14 +1,17 @@
 """Connecting: whatever is wrong is one clear sentence of the right class, soon; and nothing stays open."""
 
 import random
+import select
 import socket
 import threading
 import time
+from itertools import islice
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import serial
+import serial.rfc2217
 from serial.tools import list_ports
 
 import bubbleskin as bs
@@ -289,6 +292,47 @@ def test_a_served_board_takes_shapes_in_real_time(served):
     assert served.board.height_mm.max() < 13
     with bs.connect(served.name) as again:
         assert again.state().mode == "vented"
+
+
+class PortWithoutLines(serial.Serial):
+    """A pseudo-terminal has no modem lines for an RFC 2217 server to pass on."""
+
+    cts = dsr = ri = cd = False
+
+    def _update_rts_state(self):
+        pass
+
+    _update_dtr_state = _update_break_state = _update_rts_state
+
+
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # in pyserial
+def test_a_port_of_another_machine(served_port):
+    """Through pyserial's own RFC 2217 server."""
+
+    def pass_on(listener):
+        connection, _ = listener.accept()
+        with connection, PortWithoutLines(served_port.name, timeout=0) as port:
+            manager = serial.rfc2217.PortManager(port, SimpleNamespace(write=connection.sendall))
+            while True:
+                for ready in select.select([connection, port.fd], [], [])[0]:
+                    if ready is not connection:
+                        connection.sendall(b"".join(manager.escape(port.read(4096))))
+                    elif data := connection.recv(4096):
+                        port.write(b"".join(manager.filter(data)))
+                    else:
+                        return
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        server = threading.Thread(target=pass_on, args=(listener,))
+        server.start()
+        with bs.connect(f"rfc2217://127.0.0.1:{listener.getsockname()[1]}") as skin:
+            begin = time.monotonic()
+            assert skin.show(np.full(7, 10.0)).height_mm == pytest.approx(10, abs=0.2)
+            times = [state.time for state in islice(skin.telemetry(50), 20)]
+            assert np.diff(times) == pytest.approx(0.02)
+            assert time.monotonic() - begin < 2
+        server.join(5)
+        assert not server.is_alive()
 
 
 def test_real_time_on_request():

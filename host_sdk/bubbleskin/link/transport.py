@@ -14,6 +14,9 @@ USB_IDS = ((0x2E8A, 0x0005),)
 """Vendor and product of a Pico that runs MicroPython."""
 
 
+_POLL = 0.01
+
+
 class Transport(Protocol):
     """What the link needs of a way to a device."""
 
@@ -41,9 +44,13 @@ class SerialTransport:
 
     def __init__(self, url: str):
         self.name = url
-        exclusive: dict[str, Any] = {"exclusive": True} if "://" not in url else {}
+        # Each change of an rfc2217 port's timeout is negotiated with its server: it keeps one.
+        self._negotiates = url.startswith("rfc2217:")
+        options: dict[str, Any] = {"timeout": _POLL} if self._negotiates else {"timeout": 0, "write_timeout": 2.0}
+        if "://" not in url:
+            options["exclusive"] = True
         try:
-            self._port = serial.serial_for_url(url, baudrate=115200, timeout=0, write_timeout=2.0, **exclusive)
+            self._port = serial.serial_for_url(url, baudrate=115200, **options)
         except ValueError as error:
             raise InvalidInput(f"{url} is not a port or URL that can be opened: {error}.") from None
         except (serial.SerialException, OSError) as error:
@@ -52,6 +59,8 @@ class SerialTransport:
     def read(self, timeout: float) -> bytes:
         """Wait up to `timeout` seconds for bytes; take all that are there."""
         try:
+            if self._negotiates:
+                return self._read_polling(timeout)
             self._port.timeout = max(timeout, 0.0)
             first = self._port.read(1)
             if not first:
@@ -62,6 +71,13 @@ class SerialTransport:
             raise LinkError(
                 f"The connection to {self.name} is lost ({error}). Check the cable and connect again."
             ) from None
+
+    def _read_polling(self, timeout: float) -> bytes:
+        until = self.now() + timeout
+        while True:
+            data = bytes(self._port.read(max(1, self._port.in_waiting)))
+            if data or self.now() >= until:
+                return data
 
     def write(self, data: bytes) -> None:
         """Send all of `data`."""
