@@ -231,9 +231,21 @@ def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
 
     # A failure later, with no request at hand, has nobody to be told to.
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == messages.FAULTED
-    rig7.hands.broken.add("sense")
+    rig7.hands.broken |= {"sense", "receive"}
     rig7.tick(3)
     assert rig7.heard() == []
+
+
+def test_the_outputs_are_safe_before_anything_else_is_tried(rig7, monkeypatch):
+    def fail(*_):
+        raise MemoryError
+
+    hold(rig7)
+    rig7.hands.broken.add("sense")
+    monkeypatch.setattr(rig7.app.bubbles, "rest", fail)
+    with pytest.raises(MemoryError):
+        rig7.tick()
+    assert rig7.hands.in_vent
 
 
 @pytest.mark.parametrize("hand", ["send", "receive"])
