@@ -93,13 +93,13 @@ def test_a_short_wait_does_not_last_as_long_as_another(url):
     async def script():
         async with await bs.aconnect(url) as skin:
             begin = (await skin.state()).time
-            long = asyncio.create_task(skin.sleep(1.0))
+            long = asyncio.create_task(skin.sleep(1.5))
             await asyncio.sleep(0)
             await skin.sleep(0.1)
-            assert (await skin.state()).time - begin < 0.4
+            assert (await skin.state()).time - begin < 1.0
             assert not long.done()
             await long
-            assert (await skin.state()).time - begin == pytest.approx(1.0, abs=0.1)
+            assert (await skin.state()).time - begin >= 1.5
 
     run(script())
 
@@ -192,7 +192,7 @@ def test_a_silent_port_is_a_wrong_device(port):
         with pytest.raises(bs.WrongDevice, match="says nothing at all"):
             await bs.aconnect(port.name, timeout=0.3)
 
-    run(script(), seconds=2.0)
+    run(script(), seconds=5.0)
 
 
 def test_a_device_that_stops_answering(served_port):
@@ -202,7 +202,7 @@ def test_a_device_that_stops_answering(served_port):
             with pytest.raises(bs.DeviceSilent):
                 await skin.state()
 
-    run(script(), seconds=3.0)
+    run(script(), seconds=5.0)
 
 
 def test_connecting_can_be_given_up(port):
@@ -213,4 +213,4 @@ def test_connecting_can_be_given_up(port):
         with pytest.raises(bs.WrongDevice):  # not in use: the first attempt has let go of the port
             await bs.aconnect(port.name, timeout=0.1)
 
-    run(script(), seconds=3.0)
+    run(script(), seconds=5.0)

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.timeout(30)
 TIMEOUT = 0.4
 
 
-def fails(kind, *words, act, within=TIMEOUT + 0.6):
+def fails(kind, *words, act, within=TIMEOUT + 2):
     """`act` raises exactly `kind` in time, with sentences that hold `words`."""
     begin = time.monotonic()
     with pytest.raises(bs.BubbleskinError) as caught:
@@ -241,7 +241,7 @@ def test_telemetry_of_a_device_that_stops_answering(served_port):
         states = skin.telemetry(50)
         next(states)
         served_port.stop()
-        fails(bs.DeviceSilent, "has not answered", act=lambda: list(states), within=2 * TIMEOUT + 1)
+        fails(bs.DeviceSilent, "has not answered", act=lambda: list(states), within=2 * TIMEOUT + 2)
 
 
 def test_a_plug_that_is_pulled(port, served_port):
@@ -283,7 +283,7 @@ def test_a_served_board_takes_shapes_in_real_time(served):
         begin = time.monotonic()
         state = skin.show(np.linspace(9, 12, 7), over=0.3)
         assert state.height_mm == pytest.approx(np.linspace(9, 12, 7), abs=0.2)
-        assert 0.3 < time.monotonic() - begin < 3
+        assert 0.3 < time.monotonic() - begin < 5
         states = skin.telemetry(50)
         times = [next(states).time for _ in range(10)]
         states.close()
@@ -330,7 +330,7 @@ def test_a_port_of_another_machine(served_port):
             assert skin.show(np.full(7, 10.0)).height_mm == pytest.approx(10, abs=0.2)
             times = [state.time for state in islice(skin.telemetry(50), 20)]
             assert np.diff(times) == pytest.approx(0.02)
-            assert time.monotonic() - begin < 2
+            assert time.monotonic() - begin < 5
         server.join(5)
         assert not server.is_alive()
 
@@ -340,7 +340,7 @@ def test_real_time_on_request():
         skin.sleep(0.05)
         begin, virtual = time.monotonic(), skin.state().time
         skin.sleep(0.3)
-        assert 0.25 < time.monotonic() - begin < 1.0
+        assert 0.25 < time.monotonic() - begin < 5
         assert skin.state().time - virtual == pytest.approx(0.3, abs=0.02)
 
 
