@@ -77,6 +77,9 @@ def test_heights_up_to_rest_take_no_pressure(skin):
     skin.show(np.full(n, 11.0))
     state = skin.show(np.linspace(0, skin.info.height_rest_mm, n))
     assert set(state.status) == {"resting"}
+    assert state.height_mm.max() <= skin.info.height_rest_mm + NEAR
+    if skin.simulated:
+        assert skin.simulated.height_mm.max() <= skin.info.height_rest_mm + NEAR
     skin.sleep(1.0)
     assert skin.state().pressure_kpa == pytest.approx(0, abs=0.4)
 
@@ -112,10 +115,21 @@ def test_a_ramp_takes_its_time(skin, watch, over, low, high):
         assert np.abs(seen.since(over + SOON).height_mm - end).max() <= NEAR
 
 
-def test_a_ramp_is_waited_for(skin):
+@pytest.mark.parametrize("start", [0.0, 9.5, 12.5])
+def test_a_ramp_is_waited_for(skin, start):
     n = skin.info.bubbles
-    skin.show(np.full(n, 9.5))
+    skin.show(np.full(n, start))
     before = skin.state().time
     state = skin.show(np.full(n, 12.0), over=2.0)
     assert 1.9 <= state.time - before <= 3.0
     assert state.settled
+    assert state.height_mm == pytest.approx(12.0, abs=NEAR)
+
+
+def test_a_ramp_to_rest_is_waited_for(skin):
+    n = skin.info.bubbles
+    skin.show(np.full(n, 12.0))
+    before = skin.state().time
+    state = skin.show(np.zeros(n), over=2.0)
+    assert 0.5 <= state.time - before <= 3.5
+    assert state.height_mm == pytest.approx(skin.info.height_rest_mm, abs=NEAR)

@@ -12,6 +12,11 @@ from bubbleskin.link.wire import SCHEMA_CRC, Received
 _MODES = {number: name for number, name, _ in messages.MODES}
 _STATUSES = {number: name for number, name, _ in messages.STATUSES}
 
+_NO_PRESSURE_KPA = 1.0
+"""What an empty bubble may still have, or a sensor be off by: 0.03 mm."""
+_AT_REST_MM = 0.2
+"""How much higher than at rest a height may be and still take no pressure."""
+
 
 @dataclass(frozen=True)
 class Info:
@@ -117,6 +122,19 @@ class State:
         )
 
     @property
+    def unsettled(self) -> list[int]:
+        """The bubbles that are not where they were asked to be: settled there, or empty because that is what was asked.
+
+        A bubble also rests while it empties, and at the beginning of a ramp from rest.
+        """
+        empty = (self.pressure_kpa < _NO_PRESSURE_KPA) & (self.height_mm > self.target_mm - _AT_REST_MM)
+        return [
+            bubble
+            for bubble, status in enumerate(self.status)
+            if not (status == "settled" or (status == "resting" and empty[bubble]))
+        ]
+
+    @property
     def settled(self) -> bool:
-        """Whether every bubble is where it was asked to be: settled there, or resting without pressure."""
-        return all(status in ("settled", "resting") for status in self.status)
+        """Whether every bubble is where it was asked to be."""
+        return not self.unsettled

@@ -81,7 +81,7 @@ class AsyncSkin:
             if state.settled:
                 return state
             if self._link.transport.now() >= deadline:
-                late = [bubble for bubble, status in enumerate(state.status) if status == "moving"]
+                late = state.unsettled
                 where = ", ".join(f"{state.height_mm[b]:.2f} instead of {state.target_mm[b]:.2f} mm" for b in late)
                 raise DeviceFault(
                     f"{self.layout.names(late).capitalize()} did not settle within {patience:g} s: at {where}. "

@@ -94,7 +94,14 @@ def test_info_health_and_state_are_in_the_units_of_their_names():
     assert state.pressure_kpa.tolist() == [-0.034, 0.0]
     assert state.target_mm.tolist() == [12.0, 0.0]
     assert state.faults == ((), ("overpressure", "valve_time"))
+    assert state.unsettled == [1]
     assert not state.settled
+
+
+def test_a_bubble_that_still_empties_or_has_not_begun_to_rise_is_not_settled():
+    rows = [(5000, 80, 0, 0, 0), (9000, 21000, 0, 0, 0), (5000, 0, 10000, 0, 0), (5000, 0, 5050, 0, 0)]
+    (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 1), rows))
+    assert State.of(reply, 0.005).unsettled == [1, 2]
 
 
 def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
