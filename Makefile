@@ -35,7 +35,7 @@ lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/lint-imports --no-cache | grep -v '^[╔╚║╝╠═ ]'
+	$(BIN)/lint-imports --no-cache --no-logo
 
 generated: setup ## fail if a generated file is out of date
 	@for tool in $(GENERATORS); do $(BIN)/python tools/$$tool.py --check || exit 1; done; echo "generated files are up to date"
