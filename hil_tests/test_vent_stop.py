@@ -73,6 +73,8 @@ def test_stop_in_the_middle_of_a_move(skin, watch):
     assert np.ptp(held.height_mm, axis=0).max() <= 0.1
     if held.pulses is not None:
         assert not held.pulses.any()
+    state = skin.state()
+    assert state.target_mm == pytest.approx(state.height_mm, abs=0.2), "where they are is where they are wanted"
 
 
 def test_stop_while_vented_keeps_what_is_there(skin, watch):
