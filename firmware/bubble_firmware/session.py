@@ -33,6 +33,7 @@ class Session:
         self.telemetry_dropped = 0
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
+        self._name = (app.board.NAME.encode() + bytes(16))[:16]  # bytes: a letter of a string can be an allocation
         boot_id = app.hands.boot_id & 0xFFFFFFFF
         self._boot_id = boot_id - (boot_id >> 31 << 32)  # the same 32 bits as a signed word
         self._requests = {
@@ -132,7 +133,7 @@ class Session:
         values[3] = self._boot_id
         values[4], values[5], values[6] = FIRMWARE
         for index in range(16):
-            values[7 + index] = ord(board.NAME[index]) if index < len(board.NAME) else 0
+            values[7 + index] = self._name[index]
         values[23] = board.BUBBLES
         values[24] = board.TICK_US
         values[25] = board.HEIGHT_REST_UM
