@@ -66,11 +66,6 @@ class Trace:
         late = self.time >= seconds - 1e-9
         return Trace(self.time[late], self.height_mm[late], None if self.pulses is None else self.pulses[late])
 
-    def pulse_rate(self) -> NDArray[np.float64]:
-        """Pulses per second of each bubble, (n,)."""
-        assert self.pulses is not None
-        return self.pulses.sum(axis=0) / (self.time[-1] - self.time[0])
-
     def busiest_second(self) -> NDArray[np.int64]:
         """Most pulses of each bubble within any one second, (n,)."""
         assert self.pulses is not None
