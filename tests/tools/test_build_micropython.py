@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from bubbleskin import interpreter
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.sim import interpreter
 
 TOOL = Path(__file__).parents[2] / "tools" / "build_micropython.py"
 spec = importlib.util.spec_from_file_location("build_micropython", TOOL)
