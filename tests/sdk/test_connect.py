@@ -85,6 +85,28 @@ def test_a_timeout_that_cannot_be_meant(port, timeout):
 # Where nothing can be opened.
 
 
+def test_a_micropython_that_is_not_there(monkeypatch, tmp_path):
+    monkeypatch.delenv("MICROPYTHON", raising=False)
+    monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path))
+    fails(bs.BubbleskinError, "has not been built", "make micropython", act=connecting("micropython://wristband7"))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("not a program", ["does not run", "Set MICROPYTHON"]),
+        ("#!/bin/sh\necho broken >&2; exit 3\n", ["ended with status 3: broken."]),
+        ("#!/bin/sh\nexit 0\n", ["ended with status 0: it said nothing."]),
+    ],
+)
+def test_a_micropython_that_is_none(monkeypatch, tmp_path, content, words):
+    program = tmp_path / "micropython"
+    program.write_text(content)
+    program.chmod(0o755)
+    monkeypatch.setenv("MICROPYTHON", str(program))
+    fails(bs.LinkError, *words, act=connecting("micropython://wristband7"))
+
+
 def test_a_port_that_is_not_there():
     fails(bs.LinkError, "There is no /dev/ttyNONE.", "sim://wristband7", act=connecting("/dev/ttyNONE"))
 

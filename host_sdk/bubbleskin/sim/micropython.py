@@ -38,15 +38,22 @@ class MicroPythonFirmware:
     """A `Firmware` in another process, talked to through `bubble_firmware.boards.lockstep`."""
 
     def __init__(self, board: ModuleType, boot_id: int):
+        interpreter = find_micropython()
         program = _PROGRAM.format(path=source_path(), board=board.NAME, boot_id=boot_id)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has died
-        self._process = subprocess.Popen(
-            [find_micropython(), "-X", f"heapsize={HEAP}", "-c", program],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            bufsize=0,
-        )
+        try:
+            self._process = subprocess.Popen(
+                [interpreter, "-X", f"heapsize={HEAP}", "-c", program],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                bufsize=0,
+            )
+        except OSError as error:
+            self._errors.close()
+            raise LinkError(
+                f"{interpreter} does not run ({error.strerror}). Set MICROPYTHON to a 32-bit MicroPython (unix port)."
+            ) from None
         self._n = board.BUBBLES
         self._size = 2 + 4 * self._n + 4 + LINK_OUT
 
@@ -99,4 +106,4 @@ class MicroPythonFirmware:
         status = self._process.wait()
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
-        return LinkError(f"The firmware in MicroPython has ended with status {status}: {lines[-1]}")
+        return LinkError(f"The firmware in MicroPython has ended with status {status}: {lines[-1].rstrip('.')}.")
