@@ -2,6 +2,7 @@
 
 import random
 import zlib
+from array import array
 
 import numpy as np
 import pytest
@@ -215,3 +216,14 @@ def test_the_host_can_write_and_read_every_message():
         assert received.sequence == 65535
         assert list(received.fields) == [field[0] for field in message.fixed]
         assert all(column.tolist() == [row[at] for row in rows] for at, column in enumerate(received.columns.values()))
+
+
+def test_fields_that_newer_firmware_appends_are_passed_over():
+    message = codec.BY_NAME["PING_REPLY"]
+    frame = bytearray(framing.FRAME_MAX)
+    end = message.pack(array("i", [7, 8, 9]), 0, frame, framing.Decoder.PAYLOAD_AT)
+    frame[end : end + 5] = b"newer"
+    framing.put_header(frame, message.id, 1)
+    sealed = bytes(frame[: framing.seal(frame, end + 5 - 1, wire._crc32_into)])
+    (received,) = wire.Reader().feed(sealed)
+    assert received.fields == {"token": 7, "ticks": 8, "phase_us": 9}

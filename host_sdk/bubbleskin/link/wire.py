@@ -83,6 +83,8 @@ class Reader:
         if message is None:
             return None
         size = decoder.length - framing.HEADER
+        if not message.stride:
+            size = min(size, message.fixed_size)  # fields that newer firmware has appended
         count = message.unpack(decoder.frame, framing.Decoder.PAYLOAD_AT, size, self._values)
         if count < 0:
             return None
