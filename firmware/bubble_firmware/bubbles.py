@@ -113,6 +113,14 @@ class Bubbles:
                 at + control.FILL_RUN_US
             ] = 0
 
+    def pressure_pa(self, bubble):
+        """Gauge pressure of one bubble."""
+        return self._rows[bubble * control.ROW + control.PRESSURE]
+
+    def faults(self, bubble):
+        """Fault bits of one bubble."""
+        return self._rows[bubble * control.ROW + control.FAULTS]
+
     def report(self, values, at):
         """Put the repeated fields of STATE at `values[at:]`."""
         control.gather(self._rows, self.count, values, at)

@@ -86,6 +86,7 @@ SURPRISE_UM = const(500)  # further off than metering ever is,
 SURPRISE_PA = const(500)  # by more than noise: believe the sensor afresh
 INTEGRAL_MAX = const(1 << 17)
 READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noise
+ABSENT = const(0xFFFF)  # a count that says: no chip has answered. That is no noise
 STEP_MAX = const(16000)  # 1/16 µm: 1 mm, far more than one period moves a bubble
 NEAR = const(320)  # 1/16 µm: 20 µm, so near to the height last weighed its tangent is good to 0.1 µm
 STEEP_MAX = const(60000)  # Pa/mm
@@ -119,7 +120,7 @@ def estimate(rows, board, counts, knots):
         c = count[i]
         lost = 1 if c <= k[COUNT_LOW] or c >= k[COUNT_HIGH] else 0
         if lost:
-            s[at + LOST] = s[at + LOST] + 1
+            s[at + LOST] = s[at + LOST] + 1 if c < ABSENT else READINGS_MIN
         else:
             s[at + LOST] = 0
             s[at + PRESSURE] = (c - s[at + ZERO]) * k[PA_PER_COUNT]

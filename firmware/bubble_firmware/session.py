@@ -7,6 +7,7 @@ buffer that grows and allocates nothing in steady state.
 from array import array
 
 from bubble_firmware.table import KNOTS_MAX
+from bubble_firmware.ticks import BINS
 from bubble_protocol import codec, framing, messages
 from bubble_protocol.crc import crc32_into, crc32_word
 from bubble_protocol.portable import heap_free
@@ -30,6 +31,7 @@ class Session:
         self._period = 0  # telemetry, ticks; 0: none
         self._wait = 0
         self._telemetry_sequence = 0
+        self._owed = 0  # length of a reply in `_frame` that found no room
         self.telemetry_dropped = 0
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
@@ -46,10 +48,14 @@ class Session:
             messages.STOP: self._stop,
             messages.VENT: self._vent,
             messages.CLEAR: self._clear,
+            messages.TICKS: self._ticks,
+            messages.RESTART: self._restart,
         }
 
     def poll(self):
         """Handle what has come since the last tick; send telemetry when it is due."""
+        if self._owed and self._app.hands.send(self._frame, self._owed):
+            self._owed = 0
         chunk = self._chunk
         decoder = self._decoder
         end = self._app.hands.receive(chunk)
@@ -156,6 +162,12 @@ class Session:
         values[8] = app.supply.pressure_pa
         values[9] = app.tables.crc
         values[10] = app.mode
+        values[11] = app.faults
+        test = app.self_test
+        values[12] = test.outcome
+        values[13] = test.untrue_zero
+        values[14] = test.unfilled
+        values[15] = test.unvented
         self._reply(0)
 
     def _show(self, count):
@@ -163,6 +175,9 @@ class Session:
         board = self._app.board
         if count != board.BUBBLES:
             self._refuse(messages.WRONG_COUNT, 1, _NO_ELEMENT, count, board.BUBBLES, board.BUBBLES)
+            return
+        if self._app.faults & messages.VENTING:
+            self._refuse(messages.BOARD_FAULT, 0, _NO_ELEMENT, self._app.faults, 0, 0)
             return
         for index in range(count):
             if values[1 + index] > board.HEIGHT_MAX_UM:
@@ -238,8 +253,23 @@ class Session:
         self._acknowledge()
 
     def _clear(self, count):
-        self._app.bubbles.clear_faults()
+        self._app.clear()
         self._acknowledge()
+
+    def _ticks(self, count):
+        app = self._app
+        values = self._values
+        values[0] = app.worked.width
+        values[1] = app.delayed.width
+        for index in range(BINS):
+            values[2 + 2 * index] = app.worked.bins[index]
+            values[3 + 2 * index] = app.delayed.bins[index]
+        self._reply(BINS)
+
+    def _restart(self, count):
+        into = self._values[0]
+        self._acknowledge()
+        self._app.restart(into)
 
     # Sending.
 
@@ -274,13 +304,20 @@ class Session:
         self._send(messages.ERROR, self._decoder.sequence, 0)
 
     def _telemetry(self):
-        count = self._fill_state()
         self._telemetry_sequence = (self._telemetry_sequence + 1) & 0xFFFF
-        if not self._send(messages.TELEMETRY, self._telemetry_sequence, count):
+        if self._owed:  # a reply comes first, and stands in the frame
+            self.telemetry_dropped += 1
+            return
+        length = self._pack(messages.TELEMETRY, self._telemetry_sequence, self._fill_state())
+        if not self._app.hands.send(self._frame, length):
             self.telemetry_dropped += 1
 
     def _send(self, message_id, sequence, count):
+        length = self._pack(message_id, sequence, count)
+        self._owed = 0 if self._app.hands.send(self._frame, length) else length
+
+    def _pack(self, message_id, sequence, count):
         frame = self._frame
         end = codec.BY_ID[message_id].pack(self._values, count, frame, framing.Decoder.PAYLOAD_AT)
         framing.put_header(frame, message_id, sequence)
-        return self._app.hands.send(frame, framing.seal(frame, end - 1, crc32_into))
+        return framing.seal(frame, end - 1, crc32_into)
