@@ -9,16 +9,19 @@ import gc
 import os
 import sys
 import time
+from array import array
 
 import machine
-from machine import ADC, SPI, WDT, Pin
+from machine import ADC, I2C, SPI, WDT, Pin
 
-from bubble_firmware.drivers import mcp3208, pwm, watchdog
+from bubble_firmware.drivers import clock, mcp3208, pca9685, pwm, watchdog
 from bubble_firmware.drivers.usb_serial import UsbSerial
 from bubble_protocol import messages
 
 _WATCHDOG_MS = 80
 _SPI_HZ = 1000000
+_I2C_HZ = 1000000
+_I2C_TIMEOUT_US = 2000  # a stuck bus costs so much, once
 _MS_US = 1000
 _BLINK = 64  # ticks
 
@@ -45,13 +48,11 @@ class Hands:
         self.late_ticks = 0
         mhz = machine.freq() // 1000000
         if board.VALVES == "pwm":
-            self._valves = PwmValves(board)
+            self._valves: "PwmValves | ExpanderValves" = PwmValves(board)
             pwm.start(_PWM, board.BUBBLES, board.TICK_US, mhz)
         else:
-            from bubble_firmware.drivers.pca9685 import Pca9685Valves
-
             pwm.start(_PWM, 1, board.TICK_US, mhz)
-            self._valves = Pca9685Valves(board)
+            self._valves = ExpanderValves(board, mhz)
         self._valves.connect()
         Pin(board.PIN_PUMP, Pin.ALT, alt=Pin.ALT_PWM)
         for select, _ in board.CONVERTERS:
@@ -80,6 +81,8 @@ class Hands:
                 time.sleep_ms((left - 200) // _MS_US)
             while not pwm.wrapped(_PWM):
                 pass
+        if self._valves.stopped:
+            self._valves.start_clock()
         began = time.ticks_us()
         periods = 1
         if self._ticks:
@@ -153,7 +156,8 @@ class Hands:
 class PwmValves:
     """Valves on the RP2040's own PWM."""
 
-    silent = False
+    silent = False  # whether a chip between us and the valves does not answer
+    stopped = False  # whether `start_clock` is wanted when the next period begins
 
     def __init__(self, board):
         self._bubbles = board.BUBBLES
@@ -175,3 +179,62 @@ class PwmValves:
 
     def clear(self):
         """Nothing here fails."""
+
+
+class ExpanderValves:
+    """Valves on PCA9685, whose clock is made here so that their periods are ticks."""
+
+    def __init__(self, board, mhz):
+        self.silent = False
+        self.stopped = False
+        self._tick_us = board.TICK_US
+        self._divider = clock.divider(mhz, board.TICK_US, pca9685.CLOCKS)
+        self._safe = array("H", bytearray(4 * board.BUBBLES))
+        for index in range(1, 2 * board.BUBBLES, 2):
+            self._safe[index] = board.TICK_US
+        bus = I2C(0, freq=_I2C_HZ, sda=Pin(board.PIN_SDA), scl=Pin(board.PIN_SCL), timeout=_I2C_TIMEOUT_US)
+        self._chips = []
+        first = 0
+        for address, bubbles in board.DRIVERS:
+            self._chips.append(pca9685.Pca9685(bus, address, first, bubbles, board.TICK_US))
+            first += bubbles
+        self._turn = 0
+        Pin(board.PIN_CLOCK, Pin.ALT, alt=Pin.ALT_GPCK)
+
+    def connect(self):
+        """Set all chips up with safe outputs; they count once the clock runs."""
+        clock.stop()
+        for chip in self._chips:
+            chip.start()
+            chip.write(self._safe)
+            chip.wake()
+        self.stopped = True
+        self.silent = False
+
+    def start_clock(self):
+        """A period of the tick has just begun: let those of the chips begin."""
+        clock.start(self._divider)
+        self.stopped = False
+
+    def write(self, pulses):
+        """Set the next period; says whether the valves do as they are told."""
+        chips = self._chips
+        self._turn = self._turn + 1 if self._turn + 1 < len(chips) else 0
+        chips[self._turn].check()
+        silent = False
+        for chip in chips:
+            chip.write(pulses)
+            if chip.missing:
+                silent = True
+        self.silent = silent
+        return not silent
+
+    def vent(self):
+        """Fill closed, vent open in the next period; output enable has done it already."""
+        for chip in self._chips:
+            chip.write(self._safe)
+
+    def clear(self):
+        """Ask chips that were silent again."""
+        if self.silent:
+            self.connect()
