@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.sim.board import load_board
 from bubbleskin.sim.plant import Plant, PlantParameters
-from bubbleskin.sim.rp2040.bus import I2cBus, SpiBus
+from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import Chip
+from bubbleskin.sim.rp2040.expanders import Pca9685Bank
 from bubbleskin.sim.rp2040.mcp3208 import Mcp3208
 from bubbleskin.sim.rp2040.valves import FILL, VENT, Valves
 
@@ -76,9 +77,7 @@ class Rp2040Board:
         if data.VALVES == "pwm":
             self._bank: Any = PwmBank(self, data)
         else:
-            from bubbleskin.sim.rp2040.pca9685 import Pca9685Bank
-
-            self._bank = Pca9685Bank(self, data, I2cBus(chip, 0), absent)
+            self._bank = Pca9685Bank(chip, data, self.drive, absent)
         chip.on_pin(data.PIN_DUMP, lambda level: self._valves.dump(level is True or self._supply_lost))
         chip.mcu.gpio[data.PIN_ESTOP].set_input_value(False)  # the loop through the button, unbroken
         convert = chip.mcu.adc.on_adc_read
