@@ -11,7 +11,8 @@
     phase_us() -> µs            since this tick's period began
     alive(mode, faults)         a tick has gone well: feeds the watchdog
     clear()                     try again what has failed
-    tidy()                      a moment when nothing is urgent
+    slack()                     this tick may take long, and harms nobody: the bubbles are vented
+    tidy()                      make use of a moment when nothing is urgent
     restart(into)               start again, see RESTART
     boot_id, late_ticks         another number each boot; ticks that began late
     alarms                      board faults that are there now, bits

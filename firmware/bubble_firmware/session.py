@@ -10,6 +10,7 @@ from bubble_firmware.table import KNOTS_MAX
 from bubble_firmware.ticks import BINS
 from bubble_protocol import codec, framing, messages
 from bubble_protocol.crc import crc32_into, crc32_word
+from bubble_protocol.messages import VENTED
 from bubble_protocol.portable import heap_free
 from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
 
@@ -33,6 +34,7 @@ class Session:
         self._telemetry_sequence = 0
         self._owed = 0  # length of a reply in `_frame` that found no room
         self.telemetry_dropped = 0
+        self._heap_free = heap_free()
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
         self._requests = {
@@ -158,7 +160,10 @@ class Session:
         values[4] = self._decoder.good
         values[5] = self._decoder.bad
         values[6] = self.telemetry_dropped
-        values[7] = heap_free()
+        if app.mode == VENTED:  # counting takes longer than a tick
+            app.hands.slack()
+            self._heap_free = heap_free()
+        values[7] = self._heap_free
         values[8] = app.supply.pressure_pa
         values[9] = app.tables.crc
         values[10] = app.mode

@@ -93,6 +93,9 @@ class Hands:
     def clear(self):
         """Nothing here fails."""
 
+    def slack(self):
+        """Time stands still within a tick."""
+
     def tidy(self):
         """The interpreter collects by itself."""
 

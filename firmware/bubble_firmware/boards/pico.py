@@ -24,6 +24,7 @@ _I2C_HZ = 1000000
 _I2C_TIMEOUT_US = 2000  # a stuck bus costs so much, once
 _MS_US = 1000
 _BLINK = 64  # ticks
+_HEAP_LOW = 65536  # bytes
 
 _PWM = pwm.BASE
 _SPI = mcp3208.SPI0
@@ -43,7 +44,7 @@ class Hands:
         self._tick_us = board.TICK_US
         self._board = board
         self.boot_faults = messages.WATCHDOG if watchdog.has_bitten() else 0
-        self.boot_id = int.from_bytes(os.urandom(4), "little") & 0x3FFFFFFF
+        self.boot_id = (int.from_bytes(os.urandom(4), "little") + watchdog.count_boot()) & 0x3FFFFFFF
         self.alarms = 0
         self.late_ticks = 0
         mhz = machine.freq() // 1000000
@@ -64,6 +65,7 @@ class Hands:
         self.receive = self._link.receive
         self.send = self._link.send
         self._watchdog = None
+        self._slack = True
         self._began = 0
         self._ticks = 0
 
@@ -75,7 +77,8 @@ class Hands:
             pwm.wrapped(_PWM)
         left = self._tick_us - pwm.phase(_PWM)
         if pwm.wrapped(_PWM):
-            self.late_ticks += 1
+            if not self._slack:
+                self.late_ticks += 1
         else:
             if left > _MS_US + 200:
                 time.sleep_ms((left - 200) // _MS_US)
@@ -89,6 +92,7 @@ class Hands:
             periods = (time.ticks_diff(began, self._began) + self._tick_us // 2) // self._tick_us
         self._began = time.ticks_add(began, -pwm.phase(_PWM))
         self._ticks += 1
+        self._slack = False
         return periods if periods > 0 else 1
 
     def sense(self, counts):
@@ -132,9 +136,15 @@ class Hands:
         else:
             self._led(1 if mode != messages.VENTED or beat < 4 else 0)
 
+    def slack(self):
+        """This tick may take long."""
+        self._slack = True
+
     def tidy(self):
-        """A moment when nothing is urgent."""
-        gc.collect()
+        """Collect what garbage there is, if that is necessary at all."""
+        self.slack()
+        if gc.mem_free() < _HEAP_LOW:
+            gc.collect()
 
     def restart(self, into):
         """Start again: see RESTART. The link gets a moment to deliver the reply."""

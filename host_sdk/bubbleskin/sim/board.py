@@ -101,6 +101,9 @@ class InProcessFirmware:
     def clear(self) -> None:
         """Nothing here fails by itself."""
 
+    def slack(self) -> None:
+        """Time stands still within a tick."""
+
     def tidy(self) -> None:
         """The interpreter collects by itself."""
 
