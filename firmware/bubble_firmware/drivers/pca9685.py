@@ -37,7 +37,7 @@ def encode(pulses, first: int, bubbles: int, tick_us: int, scale: int, frame):
         width = pulse[valve]
         on = 0
         off = width * scale + 32768 >> 16
-        if width >= tick_us:
+        if width >= tick_us or off >= 4096:
             on = 0 if vent else 4096
             off = 4096 if vent else 0
         elif off == 0:
