@@ -19,7 +19,7 @@ from bubble_firmware.drivers.usb_serial import UsbSerial
 from bubble_protocol import messages
 
 _WATCHDOG_MS = 80
-_SPI_HZ = 1000000
+_SPI_HZ = 2000000
 _I2C_HZ = 1000000
 _I2C_TIMEOUT_US = 2000  # a stuck bus costs so much, once
 _MS_US = 1000

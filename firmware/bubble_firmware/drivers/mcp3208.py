@@ -6,7 +6,7 @@ channel's three bits; the answer has a zero (the "null bit") before its 12 bits:
     out  0000 01 1 c2 | c1 c0 000000 | 00000000
     in   ........     | ...0 bbbb    | bbbbbbbb
 
-Where no chip drives the line the pull-up makes the null bit one. 1 MHz is within the chip's limits from 2.7 V.
+Where no chip drives the line the pull-up makes the null bit one. 2 MHz are allowed at 5 V, 1 MHz at 2.7 V.
 
 The bytes go through the registers of the RP2040's SPI (PL022; RP2040 datasheet, 4.4) and its GPIO (2.3.1),
 which `machine.SPI` and `machine.Pin` have set up: `registers` and `gpio` are their addresses; a test passes
