@@ -26,6 +26,9 @@ from bubbleskin.errors import BubbleskinError
 from bubbleskin.interpreter import VERSION, cache_folder
 
 BOARDS = ("wristband7", "wristband19")
+BARE = "bare"
+"""In a board's place: the firmware is frozen in, but MicroPython's prompt is what starts. For tests and benches."""
+
 CHIP = "RPI_PICO"
 """MicroPython's own name of the board that carries the RP2040."""
 
@@ -174,7 +177,7 @@ def fetch(home: Path, steps: Steps) -> None:
 
 def stage(home: Path, board: str, files: dict[str, bytes]) -> Path:
     """Lay the frozen files out as in the repository, touching only those that changed; the manifest to build."""
-    files = {**files, "start/main.py": START.format(board=board).encode()}
+    files = {**files, "start/main.py": b"" if board == BARE else START.format(board=board).encode()}
     staging = home / "staging"
     for path in list(staging.rglob("*.py")):
         if path.relative_to(staging).as_posix() not in files:
@@ -265,4 +268,8 @@ def firmware(boards: Iterable[str] = BOARDS, checkout: Path | None = None, home:
         if not checkout:
             fetch(home, steps)
         source, sdk = (checkout, None) if checkout else (home / "source", home / "pico-sdk")
-        return {board: uf2 or compile_firmware(source, sdk, home, board, steps) for board, uf2 in found.items()}
+        own = checkout or home != folder()
+        for board, uf2 in found.items():  # another build may have made it while we waited
+            uf2 = uf2 or (None if own else built(board)) or compile_firmware(source, sdk, home, board, steps)
+            found[board] = uf2
+    return {board: uf2 for board, uf2 in found.items() if uf2}
