@@ -60,6 +60,7 @@ class Bubbles:
         for i in range(self.count):
             at = i * control.ROW
             row[at + control.KNOTS] = self._tables.sizes[i]
+            row[at + control.LOWEST], row[at + control.HIGHEST] = self._tables.pressures(i)
             for record in (at + control.HEIGHT, at + control.SETPOINT):
                 row[record + control.SEGMENT] = 0
                 row[record + control.WEIGHED] = -1
@@ -69,7 +70,7 @@ class Bubbles:
         """The tick's first half: sensor counts in, heights and air estimated, the setpoint moved on."""
         self._board[control.SUPPLY] = supply_pa
         self._board[control.MODE] = mode
-        control.estimate(self._rows, self._board, counts, self._tables.knots)
+        control.estimate(self._rows, self._board, self._tables.knots, counts)
 
     def decide(self, mode):
         """The tick's second half: `pulses` for the next period."""
@@ -123,4 +124,4 @@ class Bubbles:
 
     def report(self, values, at):
         """Put the repeated fields of STATE at `values[at:]`."""
-        control.gather(self._rows, self.count, values, at)
+        control.gather(self._rows, values, at, self.count)
