@@ -15,7 +15,9 @@ class Prompt:
 
     def __init__(self, chip: Chip):
         self.chip = chip
-        self._until(lambda: chip.connected and b">>> " in chip.from_device, _BOOT_S, "shown a prompt")
+        self._until(lambda: chip.connected, _BOOT_S, "appeared on USB")
+        chip.write(b"\r\n")  # what it has said before it was connected waits until it is spoken to
+        self._until(lambda: b">>> " in chip.from_device, _BOOT_S, "shown a prompt")
         chip.from_device.clear()
         chip.write(_RAW)
         self._until(lambda: chip.from_device.endswith(b"CTRL-B to exit\r\n>"), _BOOT_S, "shown its raw prompt")
