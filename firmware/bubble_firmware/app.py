@@ -27,10 +27,10 @@ from bubble_firmware.selftest import SelfTest
 from bubble_firmware.session import Session
 from bubble_firmware.supply import Supply
 from bubble_firmware.table import Tables
-from bubble_firmware.ticks import Histogram
+from bubble_firmware.ticks import bins, count
 from bubble_protocol.messages import ACTIVE, EXCEPTION, HOLDING, SELF_TEST, SUPPLY_LOST, VENTED, VENTING
 
-_TIDY_TICKS = 1024
+_TIDY_MASK = 1023  # ticks
 
 
 class App:
@@ -44,8 +44,10 @@ class App:
         self.faults = hands.boot_faults
         self.exceptions = 0
         self.tick_worst_us = 0
-        self.worked = Histogram(board.TICK_US // 50)
-        self.delayed = Histogram(board.TICK_US // 250)
+        self.work_us = board.TICK_US // 50
+        self.delay_us = board.TICK_US // 250
+        self.worked = bins()
+        self.delayed = bins()
         self.tables = Tables(board.BUBBLES)
         self.bubbles = Bubbles(board, self.tables)
         self.supply = Supply(board)
@@ -68,32 +70,32 @@ class App:
 
     def _tick(self):
         hands = self.hands
-        counts = self._counts
-        self.delayed.count(hands.phase_us())
-        hands.sense(counts)
         supply = self.supply
-        supply.sense(counts[self.board.BUBBLES])
-        alarms = hands.alarms
-        if supply.lost:
-            alarms |= SUPPLY_LOST
-        if alarms:
-            self._alarm(alarms)
         bubbles = self.bubbles
-        bubbles.sense(counts, supply.pressure_pa, self.mode)
-        bubbles.decide(self.mode)
+        counts = self._counts
+        count(self.delayed, hands.phase_us(), self.delay_us)
+        hands.sense(counts)
+        supply.sense(counts[bubbles.count])
+        if hands.alarms or supply.lost:
+            self._alarm(hands.alarms)
+        mode = self.mode
+        bubbles.sense(counts, supply.pressure_pa, mode)
+        bubbles.decide()
         if self.self_test.running:
             self._test()
         hands.act(bubbles.pulses, supply.pump, supply.dump)
         self.session.poll()
         hands.alive(self.mode, self.faults)
-        if self.mode == VENTED and self.ticks % _TIDY_TICKS == 0:
+        if not self.ticks & _TIDY_MASK and self.mode == VENTED:
             hands.tidy()
         spent = hands.phase_us()
-        self.worked.count(spent)
+        count(self.worked, spent, self.work_us)
         if spent > self.tick_worst_us:
             self.tick_worst_us = spent
 
     def _alarm(self, alarms):
+        if self.supply.lost:
+            alarms |= SUPPLY_LOST
         self.faults |= alarms
         if alarms & VENTING:
             self.hands.vent()

@@ -19,6 +19,7 @@ class Bubbles:
         self._rows = array("i", bytearray(4 * control.ROW * n))
         self._board = array("i", bytearray(4 * control.BOARD))
         self._tables = tables
+        self._knots = tables.knots
         k = self._board
         k[control.N] = n
         k[control.TICK_US] = board.TICK_US
@@ -67,15 +68,12 @@ class Bubbles:
         control.weigh(self._rows, self._board, self._tables.knots)
 
     def sense(self, counts, supply_pa, mode):
-        """The tick's first half: sensor counts in, heights and air estimated, the setpoint moved on."""
-        self._board[control.SUPPLY] = supply_pa
-        self._board[control.MODE] = mode
-        control.estimate(self._rows, self._board, self._tables.knots, counts)
+        """The tick's first half: sensor counts in, heights and air estimated."""
+        control.estimate(self._rows, self._board, self._knots, counts, supply_pa, mode)
 
-    def decide(self, mode):
-        """The tick's second half: `pulses` for the next period."""
-        self._board[control.MODE] = mode
-        control.weigh(self._rows, self._board, self._tables.knots)
+    def decide(self):
+        """The tick's second half: the setpoint moved on, `pulses` for the next period."""
+        control.weigh(self._rows, self._board, self._knots)
         control.control(self._rows, self._board, self.pulses)
 
     def show(self, values, first, ticks):

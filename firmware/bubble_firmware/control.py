@@ -1,3 +1,4 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """What is computed for every bubble in every tick: from sensor counts to the open times of its valves.
 
 The controlled quantity is *air*: the pV content of bubble and line in µJ (1 µJ = 1 kPa mm³, isothermal).
@@ -110,8 +111,10 @@ VALVE_TIME = const(4)
 
 
 @micropython.viper
-def estimate(s: ptr32, k: ptr32, knot: ptr16, count: ptr16):
+def estimate(s: ptr32, k: ptr32, knot: ptr16, count: ptr16, supply: int, mode: int):
     """Read the sensors; bring each bubble's air and height up to the start of this period."""
+    k[SUPPLY] = supply
+    k[MODE] = mode
     n = k[N]
     i = 0
     while i < n:

@@ -39,14 +39,10 @@ class SelfTest:
         self._tick_us = board.TICK_US
         self._pulse_us = _PULSE_US
         self._stage = _ZERO if wanted else _OFF
+        self.running = wanted
         self._time = 0
         self._zero = array("i", bytearray(4 * board.BUBBLES))
         self._rise = array("i", bytearray(4 * board.BUBBLES))
-
-    @property
-    def running(self):
-        """Whether the test is under way."""
-        return self._stage != _OFF
 
     @property
     def failed(self):
@@ -55,7 +51,7 @@ class SelfTest:
 
     def skip(self):
         """End the test with what is known."""
-        if self._stage != _OFF:
+        if self.running:
             self._end(SKIPPED)
 
     def tick(self, bubbles, supply):
@@ -87,6 +83,7 @@ class SelfTest:
 
     def _end(self, outcome):
         self._stage = _OFF
+        self.running = False
         ill = self.untrue_zero | self.unfilled | self.unvented
         self.outcome = FAILED if ill else outcome
 

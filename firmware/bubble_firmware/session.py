@@ -264,11 +264,11 @@ class Session:
     def _ticks(self, count):
         app = self._app
         values = self._values
-        values[0] = app.worked.width
-        values[1] = app.delayed.width
+        values[0] = app.work_us
+        values[1] = app.delay_us
         for index in range(BINS):
-            values[2 + 2 * index] = app.worked.bins[index]
-            values[3 + 2 * index] = app.delayed.bins[index]
+            values[2 + 2 * index] = app.worked[index]
+            values[3 + 2 * index] = app.delayed[index]
         self._reply(BINS)
 
     def _restart(self, count):

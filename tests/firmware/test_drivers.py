@@ -25,16 +25,18 @@ def test_all_slices_start_in_one_write_with_every_valve_safe():
 
 def test_a_pulse_is_written_as_it_is():
     block = [0] * 44
-    pwm.write(block, array("H", [0, 5000, 1500, 0, 5000, 0]), 3)
+    pwm.write(block, array("H", [0, 5000, 1500, 0, 5000, 0]), 3, 65535)
     assert [(block[at] & 0xFFFF, block[at] >> 16) for at in (3, 8, 13)] == [(0, 5000), (1500, 0), (5000, 0)]
+    assert block[38] == 6250, "the pump's compare value"
     pwm.vent(block, 3, 5000)
+    assert block[38] == 0
     assert [(block[at] & 0xFFFF, block[at] >> 16) for at in (3, 8, 13)] == [(0, 5000)] * 3
 
 
 @pytest.mark.parametrize(("duty", "compare"), [(0, 0), (65535, 6250), (32768, 3125)])
 def test_the_pump_reaches_both_ends(duty, compare):
     block = [0] * 44
-    pwm.pump(block, duty)
+    pwm.write(block, array("H", [0, 0]), 1, duty)
     assert block[7 * 5 + 3] == compare
 
 

@@ -15,7 +15,9 @@ import machine
 from machine import ADC, I2C, SPI, WDT, Pin
 
 from bubble_firmware.drivers import clock, mcp3208, pca9685, pwm, watchdog
+from bubble_firmware.drivers.led import show as show_led
 from bubble_firmware.drivers.usb_serial import UsbSerial
+from bubble_firmware.drivers.watchdog import feed
 from bubble_protocol import messages
 
 _WATCHDOG_MS = 80
@@ -23,10 +25,10 @@ _SPI_HZ = 2000000
 _I2C_HZ = 1000000
 _I2C_TIMEOUT_US = 2000  # a stuck bus costs so much, once
 _MS_US = 1000
-_BLINK = 64  # ticks
 _HEAP_LOW = 65536  # bytes
 
 _PWM = pwm.BASE
+_TIMER = pwm.TIMER
 _SPI = mcp3208.SPI0
 _SIO = mcp3208.SIO
 
@@ -39,13 +41,16 @@ class Hands:
     def __init__(self, board):
         self._disable = Pin(board.PIN_DISABLE, Pin.OUT, value=1)
         self._dump = Pin(board.PIN_DUMP, Pin.OUT, value=0)
-        self._led = Pin(board.PIN_LED, Pin.OUT, value=1)
+        self._led = board.PIN_LED
+        Pin(self._led, Pin.OUT, value=1)
         self._estop = Pin(board.PIN_ESTOP, Pin.IN, Pin.PULL_UP)
         self._tick_us = board.TICK_US
         self._board = board
         self.boot_faults = messages.WATCHDOG if watchdog.has_bitten() else 0
         self.boot_id = (int.from_bytes(os.urandom(4), "little") + watchdog.count_boot()) & 0x3FFFFFFF
         self.alarms = 0
+        self._disabled = True
+        self._dumping = 0
         self.late_ticks = 0
         mhz = machine.freq() // 1000000
         if board.VALVES == "pwm":
@@ -64,16 +69,18 @@ class Hands:
         self._link = UsbSerial()
         self.receive = self._link.receive
         self.send = self._link.send
-        self._watchdog = None
+        self._running = False
         self._slack = True
-        self._began = 0
+        self._began = array("i", (0,))
+        self._first = True
         self._ticks = 0
 
     def wait(self):
         """Sleep until the next period has begun; returns how many have begun since the last call."""
-        if self._watchdog is None:
+        if not self._running:
             gc.collect()
-            self._watchdog = WDT(timeout=_WATCHDOG_MS)
+            WDT(timeout=_WATCHDOG_MS)
+            self._running = True
             pwm.wrapped(_PWM)
         left = self._tick_us - pwm.phase(_PWM)
         if pwm.wrapped(_PWM):
@@ -86,11 +93,10 @@ class Hands:
                 pass
         if self._valves.stopped:
             self._valves.start_clock()
-        began = time.ticks_us()
-        periods = 1
-        if self._ticks:
-            periods = (time.ticks_diff(began, self._began) + self._tick_us // 2) // self._tick_us
-        self._began = time.ticks_add(began, -pwm.phase(_PWM))
+        periods = pwm.begin(_PWM, _TIMER, self._began, self._tick_us)
+        if self._first:
+            self._first = False
+            periods = 1
         self._ticks += 1
         self._slack = False
         return periods if periods > 0 else 1
@@ -112,15 +118,20 @@ class Hands:
 
     def act(self, pulses, pump, dump):
         """Set the outputs of the next period."""
-        pwm.pump(_PWM, pump)
-        self._dump(1 if dump else 0)
-        self._disable(0 if self._valves.write(pulses) else 1)
+        disabled = not self._valves.write(pulses, pump)
+        if disabled != self._disabled:
+            self._disabled = disabled
+            self._disable(disabled)
+        if dump != self._dumping:
+            self._dumping = dump
+            self._dump(dump)
 
     def vent(self):
         """Fill closed, vent open, pump off: at once, whatever the valves' drivers are doing."""
         self._disable(1)
-        pwm.pump(_PWM, 0)
+        self._disabled = True
         self._dump(0)
+        self._dumping = 0
         self._valves.vent()
 
     def clear(self):
@@ -129,12 +140,8 @@ class Hands:
 
     def alive(self, mode, faults):
         """A tick has gone well: feed the watchdog, show it on the LED."""
-        self._watchdog.feed()
-        beat = self._ticks & (_BLINK - 1)
-        if faults:
-            self._led(beat >> 3 & 1)
-        else:
-            self._led(1 if mode != messages.VENTED or beat < 4 else 0)
+        feed(_WATCHDOG_MS)
+        show_led(_SIO, self._led, self._ticks, mode, faults)
 
     def slack(self):
         """This tick may take long."""
@@ -148,7 +155,7 @@ class Hands:
 
     def restart(self, into):
         """Start again: see RESTART. The link gets a moment to deliver the reply."""
-        self._watchdog.feed()
+        feed(_WATCHDOG_MS)
         time.sleep_ms(_WATCHDOG_MS // 2)
         if into == messages.BOOT_LOADER:
             machine.bootloader()
@@ -160,7 +167,7 @@ class Hands:
 
     def phase_us(self):
         """Since this tick's period began."""
-        return time.ticks_diff(time.ticks_us(), self._began)
+        return pwm.elapsed(_TIMER, self._began)
 
 
 class PwmValves:
@@ -178,9 +185,9 @@ class PwmValves:
         for pin in range(2 * self._bubbles):
             Pin(pin, Pin.ALT, alt=Pin.ALT_PWM)
 
-    def write(self, pulses):
+    def write(self, pulses, pump):
         """Set the next period; says whether the valves do as they are told."""
-        pwm.write(_PWM, pulses, self._bubbles)
+        pwm.write(_PWM, pulses, self._bubbles, pump)
         return True
 
     def vent(self):
@@ -226,8 +233,9 @@ class ExpanderValves:
         clock.start(self._divider)
         self.stopped = False
 
-    def write(self, pulses):
+    def write(self, pulses, pump):
         """Set the next period; says whether the valves do as they are told."""
+        pwm.write(_PWM, pulses, 0, pump)
         chips = self._chips
         self._turn = self._turn + 1 if self._turn + 1 < len(chips) else 0
         chips[self._turn].check()
@@ -240,7 +248,8 @@ class ExpanderValves:
         return not silent
 
     def vent(self):
-        """Fill closed, vent open in the next period; output enable has done it already."""
+        """Fill closed, vent open in the next period; `DISABLE` has done it already. Pump off."""
+        pwm.vent(_PWM, 0, 0)
         for chip in self._chips:
             chip.write(self._safe)
 

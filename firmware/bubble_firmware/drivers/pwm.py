@@ -1,3 +1,4 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """The RP2040's PWM block (RP2040 datasheet, 4.5): the tick's pace, a pump, and on `wristband7` the valves.
 
 A slice has five registers of 32 bits, one slice after the other: CSR, DIV (8.4 bits), CTR, CC (channel A in
@@ -13,6 +14,7 @@ is open without power, and CC is how long it is left so from the start of the pe
 from bubble_protocol.portable import const, micropython, ptr16, ptr32
 
 BASE = 0x40050000
+TIMER = 0x40054000
 
 # Words of the block.
 _CSR = const(0)
@@ -23,6 +25,8 @@ _TOP = const(4)
 _SLICE = const(5)  # words from one slice to the next
 _EN = const(40)  # the enable bits of all slices, so that they start in one cycle
 _INTR = const(41)  # one bit a slice: has wrapped; cleared by writing it
+
+_TIME = const(10)  # words of the timer block: TIMERAWL, µs since power-on
 
 _INVERT_B = const(8)  # CSR
 _PUMP_SLICE = const(7)
@@ -55,34 +59,26 @@ def start(registers, slices: int, tick_us: int, mhz: int):
 
 
 @micropython.viper
-def write(registers, pulses, bubbles: int):
-    """Set the open times, µs, of fill and vent of every bubble for the next period."""
-    pwm = ptr32(registers)
-    pulse = ptr16(pulses)
+def write(registers: ptr32, pulses: ptr16, bubbles: int, duty: int):
+    """Set the next period: open times, µs, of fill and vent of every bubble; and the pump, 0 to 65535."""
     at = _CC
     i = 0
     while i < bubbles:
-        pwm[at] = pulse[2 * i] | pulse[2 * i + 1] << 16
+        registers[at] = pulses[2 * i] | pulses[2 * i + 1] << 16
         at += _SLICE
         i += 1
+    registers[_PUMP_SLICE * _SLICE + _CC] = duty * (_PUMP_TOP + 1) + 65534 >> 16
 
 
 @micropython.viper
-def vent(registers, bubbles: int, tick_us: int):
-    """Fill closed and vent open in the next period."""
-    pwm = ptr32(registers)
+def vent(registers: ptr32, bubbles: int, tick_us: int):
+    """Fill closed and vent open in the next period, pump off."""
     at = _CC
     while bubbles > 0:
-        pwm[at] = tick_us << 16
+        registers[at] = tick_us << 16
         at += _SLICE
         bubbles -= 1
-
-
-@micropython.viper
-def pump(registers, duty: int):
-    """Set the pump, 0 to 65535."""
-    pwm = ptr32(registers)
-    pwm[_PUMP_SLICE * _SLICE + _CC] = duty * (_PUMP_TOP + 1) + 65534 >> 16
+    registers[_PUMP_SLICE * _SLICE + _CC] = 0
 
 
 @micropython.viper
@@ -99,3 +95,18 @@ def wrapped(registers) -> int:
         pwm[_INTR] = 1
         return 1
     return 0
+
+
+@micropython.viper
+def begin(registers: ptr32, timer: ptr32, began: ptr32, tick_us: int) -> int:
+    """Note in `began[0]` when the period that runs began, on the timer (4.6); returns how many have since the last."""
+    now = timer[_TIME] - registers[_CTR]
+    periods = (now - began[0] + (tick_us >> 1)) // tick_us
+    began[0] = now
+    return periods
+
+
+@micropython.viper
+def elapsed(timer: ptr32, began: ptr32) -> int:
+    """Microseconds since the period began."""
+    return timer[_TIME] - began[0]

@@ -21,7 +21,10 @@ from bubble_protocol.portable import ptr32
 
 _BUFFER = 256  # CFG_TUD_CDC_TX_BUFSIZE
 _CHUNK = 63  # bytes read at once after the first
-_FILLER = bytes(1024)  # longer than any read and any write, which go through it too
+_FILLER = bytes(
+    1024
+)  # longer than what is read in one go after a rewind, and than any write, which goes through it too
+_REWIND = 512
 
 
 @micropython.viper
@@ -48,15 +51,18 @@ class UsbSerial:
     def receive(self, buffer):
         """Put the bytes that have come at the start of `buffer`; returns how many."""
         filler = self._filler
-        filler.seek(0)
+        at = filler.tell()
+        if at > _REWIND:
+            filler.seek(0)
+            at = 0
         self._in.readinto(self._first)
-        if not _sending():
+        if self._waiting and not _sending():
             self._waiting = 0
-        if filler.tell():
+        if filler.tell() != at:
             return 0
         more = self._more
         self._in.readinto(more)
-        count = _CHUNK - filler.tell()
+        count = _CHUNK - filler.tell() + at
         buffer[0] = self._first[0]
         for index in range(count):
             buffer[1 + index] = more[index]
