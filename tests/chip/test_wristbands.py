@@ -107,3 +107,23 @@ def test_the_self_test_at_boot_finds_a_stuck_valve_and_no_other(emulated):
     assert health.self_test == "failed"
     assert health.unfilled == (3,)
     assert health.untrue_zero == ()
+
+
+def test_a_program_that_hangs_is_ended_by_the_watchdog_and_says_so_afterwards(emulated):
+    skin = emulated("wristband7")
+    board = skin.simulated
+    skin.show(DOME["wristband7"], wait=False)
+    skin.sleep(0.1)
+    assert not vented(board)
+    board.inject("hang")
+    hung = board.time
+    while not vented(board):
+        board.tick()
+        assert board.time < hung + 0.1
+    assert board.chip.resets == 1
+    while not board.chip.connected:
+        board.tick()
+    skin.sleep(0.3)
+    health = skin.health()
+    assert "watchdog" in health.board_faults
+    assert health.mode == "vented"

@@ -22,7 +22,7 @@ _BOOT_S = 5.0  # emulated; it takes a fifth of a second
 _PUMP_SLICE = 7
 
 # Faults of the board, beside those of `Plant.inject`. `number` counts the chips of a kind.
-FAULTS = ("converter_silent", "driver_silent", "supply_lost", "estop")
+FAULTS = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
 
 
 class Rp2040Board:
@@ -168,7 +168,7 @@ class Rp2040Board:
         """Give the board a fault, as of `Plant.inject` or one of `FAULTS`; a value of 0 takes it away.
 
         `converter_silent`, `driver_silent`: chip `number` answers no more. `supply_lost`: the pump stands still
-        and the reservoir empties. `estop`: the button is pressed.
+        and the reservoir empties. `estop`: the button is pressed. `hang`: the program is stuck from now on.
         """
         on = value != 0
         self._valves.advance()
@@ -181,6 +181,8 @@ class Rp2040Board:
             self._valves.dump(on)
         elif fault == "estop":
             self.chip.mcu.gpio[self.data.PIN_ESTOP].set_input_value(on)
+        elif fault == "hang":
+            self.chip.hang()
         else:
             self.plant.inject(fault, number, value)
 

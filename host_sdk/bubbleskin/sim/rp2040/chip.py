@@ -19,6 +19,7 @@ from rp2040py.usb.cdc import USBCDC
 from rp2040py.utils.logging import ConsoleLogger, LogLevel
 
 CLOCK_HZ = 125_000_000
+_BEYOND = 8 << 20  # where the emulator has flash and a Pico has none
 _PACKET = 64  # bytes of one USB packet
 
 
@@ -110,6 +111,11 @@ class Chip:
         """Send bytes to the chip over USB."""
         self._cdc.to_device += data
         self._cdc.feed()
+
+    def hang(self) -> None:
+        """Let the program be stuck in an endless loop, with its interrupts still served."""
+        self.mcu.flash[_BEYOND : _BEYOND + 2] = b"\xfe\xe7"  # b .
+        self.mcu.core.pc = FLASH_START_ADDRESS + _BEYOND
 
     def on_pin(self, pin: int, changed: Callable[[bool | None], None]) -> None:
         """Call `changed` with the level of GPIO `pin` whenever it changes: None while nobody drives it."""
