@@ -78,11 +78,7 @@ class Bubbles:
 
     def show(self, values, first, ticks):
         """Ramp every bubble from where it is to the height (µm) in `values[first:]` within `ticks` ticks."""
-        row = self._rows
-        for i in range(self.count):
-            at = i * control.ROW
-            row[at + control.START] = row[at + control.HEIGHT] >> 4
-            row[at + control.TARGET] = values[first + i]
+        control.aim(self._rows, values, first, self.count)
         self._ramp(ticks)
 
     def _ramp(self, ticks):

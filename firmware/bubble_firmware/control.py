@@ -389,3 +389,24 @@ def gather(s: ptr32, v: ptr32, at: int, n: int):
         at += 5
         s = ptr32(uint(s) + 4 * ROW)
         n -= 1
+
+
+@micropython.viper
+def aim(s: ptr32, v: ptr32, at: int, n: int):
+    """Begin every bubble's way from where it is to the height (µm) in `values[at:]`."""
+    while n > 0:
+        s[START] = s[HEIGHT] >> 4
+        s[TARGET] = v[at]
+        s = ptr32(uint(s) + 4 * ROW)
+        at += 1
+        n -= 1
+
+
+@micropython.viper
+def first_above(v: ptr32, at: int, end: int, limit: int) -> int:
+    """The index of the first of `values[at:end]` above `limit`, -1 where there is none."""
+    while at < end:
+        if v[at] > limit:
+            return at
+        at += 1
+    return -1

@@ -6,6 +6,7 @@ buffer that grows and allocates nothing in steady state.
 
 from array import array
 
+from bubble_firmware import control
 from bubble_firmware.table import KNOTS_MAX
 from bubble_firmware.ticks import BINS
 from bubble_protocol import codec, framing, messages
@@ -94,29 +95,21 @@ class Session:
 
     def _within_limits(self, message, count):
         """Whether all values are within the schema's limits; refuses where one is not."""
-        at = 0
-        number = 0
-        for field in message.fixed:
-            if not self._within(field, number, _NO_ELEMENT, at):
-                return False
-            at += 1
-            number += 1
-        for element in range(count):
-            number = len(message.fixed)
-            for field in message.repeated:
-                if not self._within(field, number, element, at):
-                    return False
-                at += 1
-                number += 1
-        return True
-
-    def _within(self, field, number, element, at):
-        value = self._values[at]
+        at = message.outside(self._values, count)
+        if at < 0:
+            return True
+        fixed = len(message.fixed)
+        number = at
+        element = _NO_ELEMENT
+        if at >= fixed:
+            number = fixed + (at - fixed) % message.stride_values
+            element = (at - fixed) // message.stride_values
+        field = (message.fixed + message.repeated)[number]
         low = field[3]
         high = field[4]
-        if (low is None or value >= low) and (high is None or value <= high):
-            return True
-        self._refuse(messages.OUT_OF_RANGE, number, element, value, low or 0, 65535 if high is None else high)
+        self._refuse(
+            messages.OUT_OF_RANGE, number, element, self._values[at], low or 0, 65535 if high is None else high
+        )
         return False
 
     # Requests. Each handler answers once; `self._values` holds the request's fields, then the reply's.
@@ -184,10 +177,10 @@ class Session:
         if self._app.faults & messages.VENTING:
             self._refuse(messages.BOARD_FAULT, 0, _NO_ELEMENT, self._app.faults, 0, 0)
             return
-        for index in range(count):
-            if values[1 + index] > board.HEIGHT_MAX_UM:
-                self._refuse(messages.OUT_OF_RANGE, 1, index, values[1 + index], 0, board.HEIGHT_MAX_UM)
-                return
+        high = control.first_above(values, 1, 1 + count, board.HEIGHT_MAX_UM)
+        if high >= 0:
+            self._refuse(messages.OUT_OF_RANGE, 1, high - 1, values[high], 0, board.HEIGHT_MAX_UM)
+            return
         self._app.show(values, 1, values[0])
         self._acknowledge()
 

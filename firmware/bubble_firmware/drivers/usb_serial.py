@@ -17,6 +17,7 @@ import sys
 
 import micropython
 
+from bubble_protocol.framing import copy
 from bubble_protocol.portable import ptr32
 
 _BUFFER = 256  # CFG_TUD_CDC_TX_BUFSIZE
@@ -64,8 +65,7 @@ class UsbSerial:
         self._in.readinto(more)
         count = _CHUNK - filler.tell() + at
         buffer[0] = self._first[0]
-        for index in range(count):
-            buffer[1 + index] = more[index]
+        copy(more, 0, count, buffer, 1)
         return 1 + count
 
     def send(self, frame, length):
