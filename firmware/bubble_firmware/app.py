@@ -2,22 +2,35 @@
 
 `hands` is the board's hardware, or what stands in for it:
 
-    sense(counts)               fill in one count per bubble, then the supply's
+    wait() -> periods           until the next period has begun; how many have, 0: there will be no more
+    sense(counts)               fill in one count per bubble, then the supply's; 0xFFFF where no chip answers
     act(pulses, pump, dump)     outputs of the next period: fill and vent µs per bubble, pump 0 to 65535
     vent()                      the safe outputs, at once: fill closed, vent open, pump off
     receive(buffer) -> n        bytes that have come over the link, without waiting
     send(frame, length) -> bool whether there was room for the whole frame
-    phase_us() -> µs            since this tick began
+    phase_us() -> µs            since this tick's period began
+    alive(mode, faults)         a tick has gone well: feeds the watchdog
+    clear()                     try again what has failed
+    slack()                     this tick may take long, and harms nobody: the bubbles are vented
+    tidy()                      make use of a moment when nothing is urgent
+    restart(into)               start again, see RESTART
     boot_id, late_ticks         another number each boot; ticks that began late
+    alarms                      board faults that are there now, bits
+    boot_faults                 board faults since boot, bits
+    self_test                   whether there is hardware to test
 """
 
 from array import array
 
 from bubble_firmware.bubbles import Bubbles
+from bubble_firmware.selftest import SelfTest
 from bubble_firmware.session import Session
 from bubble_firmware.supply import Supply
 from bubble_firmware.table import Tables
-from bubble_protocol.messages import ACTIVE, HOLDING, VENTED
+from bubble_firmware.ticks import bins, count
+from bubble_protocol.messages import ACTIVE, EXCEPTION, HOLDING, SELF_TEST, SUPPLY_LOST, VENTED, VENTING
+
+_TIDY_MASK = 1023  # ticks
 
 
 class App:
@@ -28,11 +41,17 @@ class App:
         self.hands = hands
         self.ticks = 0
         self.mode = VENTED
+        self.faults = hands.boot_faults
         self.exceptions = 0
         self.tick_worst_us = 0
+        self.work_us = board.TICK_US // 50
+        self.delay_us = board.TICK_US // 250
+        self.worked = bins()
+        self.delayed = bins()
         self.tables = Tables(board.BUBBLES)
         self.bubbles = Bubbles(board, self.tables)
         self.supply = Supply(board)
+        self.self_test = SelfTest(board, hands.self_test)
         self.session = Session(self)
         self._counts = array("H", bytearray(2 * (board.BUBBLES + 1)))
         hands.vent()
@@ -51,32 +70,64 @@ class App:
         self.ticks += 1
 
     def _control(self):
+        hands = self.hands
+        supply = self.supply
+        bubbles = self.bubbles
         counts = self._counts
-        self.hands.sense(counts)
-        self.supply.sense(counts[self.board.BUBBLES])
-        self.bubbles.sense(counts, self.supply.pressure_pa, self.mode)
-        self.bubbles.decide(self.mode)
-        self.hands.act(self.bubbles.pulses, self.supply.pump, self.supply.dump)
+        count(self.delayed, hands.phase_us(), self.delay_us)
+        hands.sense(counts)
+        supply.sense(counts[bubbles.count])
+        if hands.alarms or supply.lost:
+            self._alarm(hands.alarms)
+        mode = self.mode
+        bubbles.sense(counts, supply.pressure_pa, mode)
+        bubbles.decide()
+        if self.self_test.running:
+            self._test()
+        hands.act(bubbles.pulses, supply.pump, supply.dump)
+        hands.alive(self.mode, self.faults)
 
     def _talk(self):
+        hands = self.hands
         self.session.poll()
-        spent = self.hands.phase_us()
+        if not self.ticks & _TIDY_MASK and self.mode == VENTED:
+            hands.tidy()
+        spent = hands.phase_us()
+        count(self.worked, spent, self.work_us)
         if spent > self.tick_worst_us:
             self.tick_worst_us = spent
 
     def _fail(self):
         self.hands.vent()  # first of all
         self.exceptions += 1
+        self.faults |= EXCEPTION
         self.vent()
+
+    def _alarm(self, alarms):
+        if self.supply.lost:
+            alarms |= SUPPLY_LOST
+        self.faults |= alarms
+        if alarms & VENTING:
+            self.hands.vent()
+            self.self_test.skip()
+            if self.mode != VENTED:
+                self.vent()
+
+    def _test(self):
+        self.self_test.tick(self.bubbles, self.supply)
+        if self.self_test.failed:
+            self.faults |= SELF_TEST
 
     def show(self, values, first, over_ms):
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""
+        self.self_test.skip()
         ticks = over_ms * 1000 // self.board.TICK_US
         self.bubbles.show(values, first, ticks if ticks > 1 else 1)
         self.mode = ACTIVE
 
     def stop(self):
         """Close all valves and keep the air."""
+        self.self_test.skip()
         self.bubbles.hold()
         self.mode = HOLDING
 
@@ -85,8 +136,25 @@ class App:
         self.bubbles.rest()
         self.mode = VENTED
 
+    def clear(self):
+        """Forget all faults; what still is wrong faults again."""
+        self.faults = 0
+        self.supply.clear()
+        self.bubbles.clear_faults()
+        self.hands.clear()
+
+    def restart(self, into):
+        """Vent and start again."""
+        self.vent()
+        self.hands.vent()
+        self.hands.restart(into)
+
 
 def run(app):
     """Tick for as long as the hands' clock does."""
-    while app.hands.wait():
+    while True:
+        periods = app.hands.wait()
+        if not periods:
+            return
+        app.ticks += periods - 1
         app.tick()

@@ -19,6 +19,7 @@ class Bubbles:
         self._rows = array("i", bytearray(4 * control.ROW * n))
         self._board = array("i", bytearray(4 * control.BOARD))
         self._tables = tables
+        self._knots = tables.knots
         k = self._board
         k[control.N] = n
         k[control.TICK_US] = board.TICK_US
@@ -60,30 +61,24 @@ class Bubbles:
         for i in range(self.count):
             at = i * control.ROW
             row[at + control.KNOTS] = self._tables.sizes[i]
+            row[at + control.LOWEST], row[at + control.HIGHEST] = self._tables.pressures(i)
             for record in (at + control.HEIGHT, at + control.SETPOINT):
                 row[record + control.SEGMENT] = 0
                 row[record + control.WEIGHED] = -1
         control.weigh(self._rows, self._board, self._tables.knots)
 
     def sense(self, counts, supply_pa, mode):
-        """The tick's first half: sensor counts in, heights and air estimated, the setpoint moved on."""
-        self._board[control.SUPPLY] = supply_pa
-        self._board[control.MODE] = mode
-        control.estimate(self._rows, self._board, counts, self._tables.knots)
+        """The tick's first half: sensor counts in, heights and air estimated."""
+        control.estimate(self._rows, self._board, self._knots, counts, supply_pa, mode)
 
-    def decide(self, mode):
-        """The tick's second half: `pulses` for the next period."""
-        self._board[control.MODE] = mode
-        control.weigh(self._rows, self._board, self._tables.knots)
+    def decide(self):
+        """The tick's second half: the setpoint moved on, `pulses` for the next period."""
+        control.weigh(self._rows, self._board, self._knots)
         control.control(self._rows, self._board, self.pulses)
 
     def show(self, values, first, ticks):
         """Ramp every bubble from where it is to the height (µm) in `values[first:]` within `ticks` ticks."""
-        row = self._rows
-        for i in range(self.count):
-            at = i * control.ROW
-            row[at + control.START] = row[at + control.HEIGHT] >> 4
-            row[at + control.TARGET] = values[first + i]
+        control.aim(self._rows, values, first, self.count)
         self._ramp(ticks)
 
     def _ramp(self, ticks):
@@ -114,6 +109,14 @@ class Bubbles:
         for i in range(self.count):
             self._rows[i * control.ROW + control.FAULTS] = 0
 
+    def pressure_pa(self, bubble):
+        """Gauge pressure of one bubble."""
+        return self._rows[bubble * control.ROW + control.PRESSURE]
+
+    def faults(self, bubble):
+        """Fault bits of one bubble."""
+        return self._rows[bubble * control.ROW + control.FAULTS]
+
     def report(self, values, at):
         """Put the repeated fields of STATE at `values[at:]`."""
-        control.gather(self._rows, self.count, values, at)
+        control.gather(self._rows, values, at, self.count)

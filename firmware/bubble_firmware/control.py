@@ -1,3 +1,4 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """What is computed for every bubble in every tick: from sensor counts to the open times of its valves.
 
 The controlled quantity is *air*: the pV content of bubble and line in µJ (1 µJ = 1 kPa mm³, isothermal).
@@ -11,10 +12,11 @@ Height is a single valued function of air even where pressure hardly changes wit
 
 A command computed in one tick acts from the start of the next: the PWM hardware latches it there. All
 state is one array of 32-bit integers, a row per bubble; the functions are viper on the device and
-ordinary Python elsewhere, and compute the same integers. They allocate nothing.
+ordinary Python elsewhere, and compute the same integers. They allocate nothing. The pointers come first among
+their arguments because viper keeps the first three in registers.
 """
 
-from bubble_protocol.portable import const, micropython, ptr16, ptr32
+from bubble_protocol.portable import const, micropython, ptr16, ptr32, uint
 
 # One row: where each number of a bubble stands.
 ZERO = const(0)  # sensor counts at no pressure
@@ -50,7 +52,9 @@ MODEL = const(2)  # pressure, Pa
 CONTENT = const(3)  # air, µJ
 SLOPE = const(4)  # air per height, µJ/µm, *256
 WEIGHED = const(5)  # the height that these belong to
-ROW = const(37)
+LOWEST = const(37)  # pressures of its table, Pa
+HIGHEST = const(38)
+ROW = const(39)
 
 # The board's numbers.
 N = const(0)
@@ -86,6 +90,7 @@ SURPRISE_UM = const(500)  # further off than metering ever is,
 SURPRISE_PA = const(500)  # by more than noise: believe the sensor afresh
 INTEGRAL_MAX = const(1 << 17)
 READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noise
+ABSENT = const(0xFFFF)  # a count that says: no chip has answered. That is no noise
 STEP_MAX = const(16000)  # 1/16 µm: 1 mm, far more than one period moves a bubble
 NEAR = const(320)  # 1/16 µm: 20 µm, so near to the height last weighed its tangent is good to 0.1 µm
 ROOT_MAX = const(20000)  # 8 Pa: more than any two readings give; from there Newton's next step is a good one
@@ -107,101 +112,87 @@ VALVE_TIME = const(4)
 
 
 @micropython.viper
-def estimate(rows, board, counts, knots):
+def estimate(s: ptr32, k: ptr32, knot: ptr16, count: ptr16, supply: int, mode: int):
     """Read the sensors; bring each bubble's air and height up to the start of this period."""
-    s = ptr32(rows)
-    k = ptr32(board)
-    count = ptr16(counts)
-    knot = ptr16(knots)
+    k[SUPPLY] = supply
+    k[MODE] = mode
     n = k[N]
-    count_low = k[COUNT_LOW]
-    count_high = k[COUNT_HIGH]
-    stride = k[KNOT_STRIDE]
-    p0 = 0
-    p1 = 0
     i = 0
-    at = 0
     while i < n:
         c = count[i]
-        lost = 0
-        if c <= count_low or c >= count_high:
-            lost = s[at + LOST] + 1
-        s[at + LOST] = lost
-        p = s[at + PRESSURE]
-        if lost == 0:
-            p = (c - s[at + ZERO]) * k[PA_PER_COUNT]
-            s[at + PRESSURE] = p
-        air = s[at + AIR] + s[at + DOSE]
-        slope = s[at + HEIGHT + SLOPE]
-        content = s[at + HEIGHT + CONTENT]
-        status = s[at + STATUS]
-        open_vent = 1 if status == RESTING or status == FAULT else 0
-        if lost == 0 and (open_vent or s[at + BUSY] <= 0):
+        lost = 1 if c <= k[COUNT_LOW] or c >= k[COUNT_HIGH] else 0
+        if lost:
+            s[LOST] = s[LOST] + 1 if c < ABSENT else READINGS_MIN
+        else:
+            s[LOST] = 0
+            s[PRESSURE] = (c - s[ZERO]) * k[PA_PER_COUNT]
+        p = s[PRESSURE]
+        air = s[AIR] + s[DOSE]
+        slope = s[HEIGHT + SLOPE]
+        open_vent = 1 if s[STATUS] == RESTING or s[STATUS] == FAULT else 0
+        if lost == 0 and (open_vent or s[BUSY] <= 0):
             # The height that holds this pressure: in the segment that contains it and is nearest to the
             # estimate's, because a bubble stays on the branch where it was. No segment: beyond an end.
-            begin = i * stride
-            end = begin + 2 * (s[at + KNOTS] - 1)
-            low = begin + 2 * s[at + HEIGHT + SEGMENT]
+            begin = i * k[KNOT_STRIDE]
+            end = begin + 2 * (s[KNOTS] - 1)
+            low = begin + 2 * s[HEIGHT + SEGMENT]
             high = low
             found = -1
-            while found < 0 and (low >= begin or high < end):
+            within = 1 if s[LOWEST] <= p and p <= s[HIGHEST] else 0
+            while within and found < 0 and (low >= begin or high < end):
                 if low >= begin:
-                    p0 = knot[low + 1]
-                    p1 = knot[low + 3]
-                    if (p0 <= p and p <= p1) or (p1 <= p and p <= p0):
+                    if (knot[low + 1] <= p and p <= knot[low + 3]) or (knot[low + 3] <= p and p <= knot[low + 1]):
                         found = low
                     low -= 2
                 if found < 0 and high < end:
-                    p0 = knot[high + 1]
-                    p1 = knot[high + 3]
-                    if (p0 <= p and p <= p1) or (p1 <= p and p <= p0):
+                    if (knot[high + 1] <= p and p <= knot[high + 3]) or (knot[high + 3] <= p and p <= knot[high + 1]):
                         found = high
                     high += 2
             if found < 0:
                 measured = knot[end] if p > 0 else knot[begin]
             else:
                 measured = knot[found]
-                if p1 != p0:
-                    measured += (p - p0) * (knot[found + 2] - measured) // (p1 - p0)
-            off = measured - (s[at + HEIGHT + WEIGHED] >> 4)
-            means = content + (off * slope >> 8)
+                rise = knot[found + 3] - knot[found + 1]
+                if rise != 0:
+                    measured += (p - knot[found + 1]) * (knot[found + 2] - knot[found]) // rise
+            off = measured - (s[HEIGHT + WEIGHED] >> 4)
+            trust = s[TRUST] + 1
             if open_vent:
-                air += (means - air) >> 2
+                trust = 0
+            elif (off > SURPRISE_UM or off < 0 - SURPRISE_UM) and (
+                p - s[HEIGHT + MODEL] > SURPRISE_PA or p - s[HEIGHT + MODEL] < 0 - SURPRISE_PA
+            ):
+                trust = 1
+            elif trust > TRUST_MAX:
+                trust = TRUST_MAX
+            s[TRUST] = trust
+            off = s[HEIGHT + CONTENT] + (off * slope >> 8) - air  # now of air
+            if trust == 0:
+                air += off >> 2
             else:
-                trust = s[at + TRUST] + 1
-                if off > SURPRISE_UM or off < 0 - SURPRISE_UM:
-                    wrong = p - s[at + HEIGHT + MODEL]
-                    if wrong > SURPRISE_PA or wrong < 0 - SURPRISE_PA:
-                        trust = 1
-                if trust > TRUST_MAX:
-                    trust = TRUST_MAX
-                s[at + TRUST] = trust
-                air += (means - air + (trust >> 1)) // trust  # rounded: a bias would add up over so many
+                air += (off + (trust >> 1)) // trust  # rounded: a bias would add up over so many
         if air < 0:
             air = 0
         if air > AIR_MAX:
             air = AIR_MAX
-        s[at + AIR] = air
+        s[AIR] = air
         # The height that this air means, along the tangent at the height last weighed.
-        step = (air - content << 12) // slope
+        step = (air - s[HEIGHT + CONTENT] << 12) // slope
         if step > STEP_MAX:
             step = STEP_MAX
         if step < 0 - STEP_MAX:
             step = 0 - STEP_MAX
-        s[at + HEIGHT] = s[at + HEIGHT + WEIGHED] + step
+        s[HEIGHT] = s[HEIGHT + WEIGHED] + step
         i += 1
-        at += ROW
+        s = ptr32(uint(s) + 4 * ROW)
 
 
 @micropython.viper
-def weigh(rows, board, knots):
+def weigh(s: ptr32, k: ptr32, knot: ptr16):
     """Move the setpoints on; then pressure, air and air per height of every estimate and setpoint, by the bubble's table.
 
     An estimate is weighed again when it has left the neighbourhood of where it was weighed last.
     """
-    s = ptr32(rows)
-    k = ptr32(board)
-    knot = ptr16(knots)
     n = k[N]
     dead = k[DEAD_VOLUME]
     moving = 0
@@ -209,28 +200,28 @@ def weigh(rows, board, knots):
         k[RAMP_DONE] = k[RAMP_DONE] + 1
         moving = 1
     i = 0
-    row = 0
     while i < n:
         if moving:
-            reach = s[row + TARGET] - s[row + START]
-            s[row + SETPOINT] = (s[row + START] + reach * k[RAMP_DONE] // k[RAMP_TICKS]) << 4
-        at = row + HEIGHT
-        while at <= row + SETPOINT:
-            off = s[at] - s[at + WEIGHED]
-            if off > NEAR or off < 0 - NEAR or (at != row + HEIGHT and off != 0):
+            reach = s[TARGET] - s[START]
+            s[SETPOINT] = (s[START] + reach * k[RAMP_DONE] // k[RAMP_TICKS]) << 4
+        w = ptr32(uint(s) + 4 * HEIGHT)
+        exact = 0
+        while exact < 2:
+            off = w[0] - w[WEIGHED]
+            if off > NEAR or off < 0 - NEAR or (exact and off != 0):
                 begin = i * k[KNOT_STRIDE]
-                end = begin + 2 * (s[row + KNOTS] - 1)
-                if s[at] < knot[begin] << 4:
-                    s[at] = knot[begin] << 4
-                if s[at] > knot[end] << 4:
-                    s[at] = knot[end] << 4
-                h = s[at] >> 4
-                seg = begin + 2 * s[at + SEGMENT]
+                end = begin + 2 * (s[KNOTS] - 1)
+                if w[0] < knot[begin] << 4:
+                    w[0] = knot[begin] << 4
+                if w[0] > knot[end] << 4:
+                    w[0] = knot[end] << 4
+                h = w[0] >> 4
+                seg = begin + 2 * w[SEGMENT]
                 while h < knot[seg]:
                     seg -= 2
                 while seg < end - 2 and h >= knot[seg + 2]:
                     seg += 2
-                s[at + SEGMENT] = (seg - begin) >> 1
+                w[SEGMENT] = (seg - begin) >> 1
                 p0 = knot[seg + 1]
                 rise = knot[seg + 3] - p0
                 run = knot[seg + 2] - knot[seg]
@@ -244,109 +235,93 @@ def weigh(rows, board, knots):
                 square = h * h >> 12
                 volume = ((square * h >> 12) * 2303 >> 12) + dead
                 p16 = p + ATMOSPHERE >> 4
-                s[at + MODEL] = p
-                s[at + CONTENT] = p16 * volume // 4000
+                w[MODEL] = p
+                w[CONTENT] = p16 * volume // 4000
                 # d(pV)/dh = p dV/dh + V dp/dh, *256; kept positive, as it is for every bubble that holds air
                 slope = ((p16 * square >> 12) * 7074 >> 16) + (((volume >> 4) * steep >> 6) * 268 >> 16)
-                s[at + SLOPE] = slope if slope > SLOPE_MIN else SLOPE_MIN
-                s[at + WEIGHED] = s[at]
-            at += SETPOINT - HEIGHT
+                w[SLOPE] = slope if slope > SLOPE_MIN else SLOPE_MIN
+                w[WEIGHED] = w[0]
+            w = ptr32(uint(s) + 4 * SETPOINT)
+            exact += 1
         i += 1
-        row += ROW
+        s = ptr32(uint(s) + 4 * ROW)
 
 
 @micropython.viper
-def control(rows, board, pulses):
+def control(s: ptr32, k: ptr32, pulse: ptr16):
     """Guard, then decide what each valve does in the next period: `pulses` holds fill and vent µs of every bubble."""
-    s = ptr32(rows)
-    k = ptr32(board)
-    pulse = ptr16(pulses)
     n = k[N]
     tick = k[TICK_US]
-    mode = k[MODE]
-    pressure_max = k[PRESSURE_MAX]
-    settled = k[SETTLED_UM]
-    rest = (k[REST_UM] + k[DEADBAND_UM]) << 4
-    still = 1 if k[RAMP_DONE] == k[RAMP_TICKS] else 0
     i = 0
-    at = 0
     while i < n:
-        p = s[at + PRESSURE]
-        filled = s[at + FILL_US]
-        vented = s[at + VENT_US]
+        p = s[PRESSURE]
+        filled = s[FILL_US]
+        vented = s[VENT_US]
         energised = filled + vented
-        closes = s[at + CLOSES_US]
-        dose = s[at + NEXT]
-        s[at + DOSE] = dose
+        opens = s[OPENS_US]
+        closes = s[CLOSES_US]
+        s[DOSE] = s[NEXT]
 
         # Guard. A fault stays until it is cleared.
-        over = 0
-        if p > pressure_max:
-            over = s[at + OVER] + 1
-            if over >= READINGS_MIN:
-                s[at + FAULTS] = s[at + FAULTS] | OVERPRESSURE
-        s[at + OVER] = over
-        run = 0
-        if filled == tick:
-            run = s[at + FILL_RUN_US] + tick
-            if run >= k[FILL_MAX_US]:
-                s[at + FAULTS] = s[at + FAULTS] | VALVE_TIME
-        s[at + FILL_RUN_US] = run
-        if s[at + LOST] >= READINGS_MIN:
-            s[at + FAULTS] = s[at + FAULTS] | SENSOR_LOST
+        s[OVER] = s[OVER] + 1 if p > k[PRESSURE_MAX] else 0
+        s[FILL_RUN_US] = s[FILL_RUN_US] + filled if filled == tick else 0
+        if s[OVER] >= READINGS_MIN:
+            s[FAULTS] = s[FAULTS] | OVERPRESSURE
+        if s[LOST] >= READINGS_MIN:
+            s[FAULTS] = s[FAULTS] | SENSOR_LOST
+        if s[FILL_RUN_US] >= k[FILL_MAX_US]:
+            s[FAULTS] = s[FAULTS] | VALVE_TIME
 
         # When will the line be quiet, seen from the start of the next period?
-        busy = s[at + BUSY]
         if energised:
-            busy = energised + closes + k[QUIET_US] - tick
-            s[at + BUSY] = busy
-        elif busy > 0:
-            busy -= tick
-            s[at + BUSY] = busy
+            s[BUSY] = energised + closes + k[QUIET_US] - tick
+        elif s[BUSY] > 0:
+            s[BUSY] = s[BUSY] - tick
 
         # A valve energised to the end of this period closes its dead time into the next: that air comes anyway.
         tail = 0
         if energised == tick:
-            tail = s[at + FLOW] * closes // 16000
+            tail = s[FLOW] * closes // 16000
             if vented:
                 tail = 0 - tail
 
         fill = 0
         vent = 0
-        aim = s[at + SETPOINT + CONTENT]
-        before = s[at + AIM]
-        ahead = aim - before  # what the setpoint's own motion asks for: feed-forward
-        error = before - s[at + AIR] - dose - tail
         dose = tail
-        if s[at + FAULTS] or mode == VENTED or (mode == ACTIVE and s[at + SETPOINT] <= rest):
-            s[at + STATUS] = FAULT if s[at + FAULTS] else RESTING
+        aim = s[SETPOINT + CONTENT]
+        ahead = aim - s[AIM]  # what the setpoint's own motion asks for: feed-forward
+        error = s[AIM] - s[AIR] - s[DOSE] - tail
+        resting = 1 if s[SETPOINT] <= (k[REST_UM] + k[DEADBAND_UM]) << 4 else 0
+        if s[FAULTS] or k[MODE] == VENTED or (k[MODE] == ACTIVE and resting):
+            s[STATUS] = FAULT if s[FAULTS] else RESTING
             vent = tick
             dose = 0
-            aim = s[at + AIR]
+            aim = s[AIR]
             error = 0
-            s[at + INTEGRAL] = 0
-            s[at + TRUST] = 0
-            s[at + FLOW] = 0
-        elif mode != ACTIVE:
-            s[at + STATUS] = STOPPED
-            aim = s[at + AIR]
+            s[INTEGRAL] = 0
+            s[TRUST] = 0
+            s[FLOW] = 0
+        elif k[MODE] != ACTIVE:
+            s[STATUS] = STOPPED
+            aim = s[AIR]
             error = 0
         else:
-            off = s[at + TARGET] - (s[at + HEIGHT] >> 4)
-            near = 1 if off <= settled and off >= 0 - settled else 0
-            s[at + STATUS] = SETTLED if near and still and s[at + TRUST] > 1 else MOVING
-            band = s[at + SETPOINT + SLOPE] * k[DEADBAND_UM] >> 8
+            off = s[TARGET] - (s[HEIGHT] >> 4)
+            still = 1 if k[RAMP_DONE] == k[RAMP_TICKS] else 0
+            near = 1 if off <= k[SETTLED_UM] and off >= 0 - k[SETTLED_UM] else 0
+            s[STATUS] = SETTLED if near and still and s[TRUST] > 1 else MOVING
+            band = s[SETPOINT + SLOPE] * k[DEADBAND_UM] >> 8
             enough = 1 if ahead == 0 and error <= band and error >= 0 - band else 0
-            if s[at + TRUST] and enough == 0:
-                integral = s[at + INTEGRAL] + error
-                change = error - s[at + ERROR]
+            if s[TRUST] and enough == 0:
+                integral = s[INTEGRAL] + error
+                change = error - s[ERROR]
                 want = ahead + (error * k[GAIN_P] + integral * k[GAIN_I] + change * k[GAIN_D] >> 8)
                 fills = 1 if want > 0 else 0
                 size = want if fills else 0 - want
 
                 # Flow of a restrictor below its critical ratio (ISO 6358): C p1 sqrt(1 - ((p2/p1 - b)/(1 - b))²)
                 # = C/(1 - b) sqrt((p1 - p2) (p2 + (1 - 2b) p1)). The root by Newton from the last one.
-                lost = k[TUBE] * s[at + FLOW] >> 4 if busy <= 0 else 0
+                lost = k[TUBE] * s[FLOW] >> 4 if s[BUSY] <= 0 else 0
                 if fills:
                     p1 = k[SUPPLY] + ATMOSPHERE
                     p2 = p + lost + ATMOSPHERE
@@ -356,20 +331,20 @@ def control(rows, board, pulses):
                 square = 0
                 if p1 > p2:
                     square = (p1 - p2 >> 3) * ((p1 * (256 - 2 * k[CRITICAL]) >> 8) + p2 >> 3)
-                root = s[at + ROOT]
+                root = s[ROOT]
                 root = (root + square // root >> 1) + 1
                 if root > ROOT_MAX:  # far off, as after no pressure at all
                     root = ROOT_MAX
                 root = (root + square // root >> 1) + 1
-                s[at + ROOT] = root
-                flow = (root * s[at + FLOW_GAIN] >> 12) + 1
-                s[at + FLOW] = flow
+                s[ROOT] = root
+                flow = (root * s[FLOW_GAIN] >> 12) + 1
+                s[FLOW] = flow
 
                 # Air to time. A valve that is still open needs no opening and its closing is in the tail.
                 if size > SIZE_MAX:
                     size = SIZE_MAX
                 opened = 1 if (fills and filled == tick) or (fills == 0 and vented == tick) else 0
-                delay = 0 if opened else s[at + OPENS_US] - closes
+                delay = 0 if opened else opens - closes
                 width = size * 16000 // flow + delay
                 if width > tick - k[PULSE_MIN_US]:  # too short a gap to close in
                     width = tick if width > tick - (k[PULSE_MIN_US] >> 1) else tick - k[PULSE_MIN_US]
@@ -382,7 +357,7 @@ def control(rows, board, pulses):
                         integral = INTEGRAL_MAX
                     if integral < 0 - INTEGRAL_MAX:
                         integral = 0 - INTEGRAL_MAX
-                    s[at + INTEGRAL] = integral
+                    s[INTEGRAL] = integral
                 if width:
                     moved = width - delay
                     if width == tick:
@@ -395,32 +370,50 @@ def control(rows, board, pulses):
                         vent = width
                         dose -= moved
                     if width == tick:
-                        s[at + TRUST] = 1
-                    elif s[at + TRUST] > TRUST_DOSED:
-                        s[at + TRUST] = TRUST_DOSED
-        s[at + AIM] = aim
-        s[at + ERROR] = error
-        s[at + NEXT] = dose
-        s[at + FILL_US] = fill
-        s[at + VENT_US] = vent
+                        s[TRUST] = 1
+                    elif s[TRUST] > TRUST_DOSED:
+                        s[TRUST] = TRUST_DOSED
+        s[AIM] = aim
+        s[ERROR] = error
+        s[NEXT] = dose
+        s[FILL_US] = fill
+        s[VENT_US] = vent
         pulse[2 * i] = fill
         pulse[2 * i + 1] = vent
         i += 1
-        at += ROW
+        s = ptr32(uint(s) + 4 * ROW)
 
 
 @micropython.viper
-def gather(rows, n: int, values, at: int):
+def gather(s: ptr32, v: ptr32, at: int, n: int):
     """Copy what STATE and TELEMETRY say of every bubble to `values[at:]`, in the schema's order."""
-    s = ptr32(rows)
-    v = ptr32(values)
-    row = 0
     while n > 0:
-        v[at] = s[row + HEIGHT] >> 4
-        v[at + 1] = s[row + PRESSURE]
-        v[at + 2] = s[row + TARGET]
-        v[at + 3] = s[row + STATUS]
-        v[at + 4] = s[row + FAULTS]
+        v[at] = s[HEIGHT] >> 4
+        v[at + 1] = s[PRESSURE]
+        v[at + 2] = s[TARGET]
+        v[at + 3] = s[STATUS]
+        v[at + 4] = s[FAULTS]
         at += 5
-        row += ROW
+        s = ptr32(uint(s) + 4 * ROW)
         n -= 1
+
+
+@micropython.viper
+def aim(s: ptr32, v: ptr32, at: int, n: int):
+    """Begin every bubble's way from where it is to the height (µm) in `values[at:]`."""
+    while n > 0:
+        s[START] = s[HEIGHT] >> 4
+        s[TARGET] = v[at]
+        s = ptr32(uint(s) + 4 * ROW)
+        at += 1
+        n -= 1
+
+
+@micropython.viper
+def first_above(v: ptr32, at: int, end: int, limit: int) -> int:
+    """The index of the first of `values[at:end]` above `limit`, -1 where there is none."""
+    while at < end:
+        if v[at] > limit:
+            return at
+        at += 1
+    return -1

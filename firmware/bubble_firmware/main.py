@@ -10,3 +10,12 @@ def lockstep(name, boot_id):
 
     board = boards.load(name)
     run(App(board, Hands(board.BUBBLES, boot_id)))
+
+
+def pico(name):
+    """Run the firmware of board `name` on the Raspberry Pi Pico that this is."""
+    from bubble_firmware.boards.pico import Hands
+
+    board = boards.load(name)
+    hands = Hands(board)  # first of all: it makes the outputs safe
+    run(App(board, hands))

@@ -6,9 +6,12 @@ buffer that grows and allocates nothing in steady state.
 
 from array import array
 
+from bubble_firmware import control
 from bubble_firmware.table import KNOTS_MAX
+from bubble_firmware.ticks import BINS
 from bubble_protocol import codec, framing, messages
 from bubble_protocol.crc import crc32_into, crc32_word
+from bubble_protocol.messages import VENTED
 from bubble_protocol.portable import heap_free
 from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
 
@@ -30,7 +33,9 @@ class Session:
         self._period = 0  # telemetry, ticks; 0: none
         self._wait = 0
         self._telemetry_sequence = 0
+        self._owed = 0  # length of a reply in `_frame` that found no room
         self.telemetry_dropped = 0
+        self._heap_free = heap_free()
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
         self._name = (app.board.NAME.encode() + bytes(16))[:16]  # bytes: a letter of a string can be an allocation
@@ -49,10 +54,14 @@ class Session:
             messages.STOP: self._stop,
             messages.VENT: self._vent,
             messages.CLEAR: self._clear,
+            messages.TICKS: self._ticks,
+            messages.RESTART: self._restart,
         }
 
     def poll(self):
         """Handle what has come since the last tick; send telemetry when it is due."""
+        if self._owed and self._app.hands.send(self._frame, self._owed):
+            self._owed = 0
         chunk = self._chunk
         decoder = self._decoder
         end = self._app.hands.receive(chunk)
@@ -93,29 +102,21 @@ class Session:
 
     def _within_limits(self, message, count):
         """Whether all values are within the schema's limits; refuses where one is not."""
-        at = 0
-        number = 0
-        for field in message.fixed:
-            if not self._within(field, number, _NO_ELEMENT, at):
-                return False
-            at += 1
-            number += 1
-        for element in range(count):
-            number = len(message.fixed)
-            for field in message.repeated:
-                if not self._within(field, number, element, at):
-                    return False
-                at += 1
-                number += 1
-        return True
-
-    def _within(self, field, number, element, at):
-        value = self._values[at]
+        at = message.outside(self._values, count)
+        if at < 0:
+            return True
+        fixed = len(message.fixed)
+        number = at
+        element = _NO_ELEMENT
+        if at >= fixed:
+            number = fixed + (at - fixed) % message.stride_values
+            element = (at - fixed) // message.stride_values
+        field = (message.fixed + message.repeated)[number]
         low = field[3]
         high = field[4]
-        if (low is None or value >= low) and (high is None or value <= high):
-            return True
-        self._refuse(messages.OUT_OF_RANGE, number, element, value, low or 0, 65535 if high is None else high)
+        self._refuse(
+            messages.OUT_OF_RANGE, number, element, self._values[at], low or 0, 65535 if high is None else high
+        )
         return False
 
     # Requests. Each handler answers once; `self._values` holds the request's fields, then the reply's.
@@ -159,10 +160,19 @@ class Session:
         values[4] = self._decoder.good
         values[5] = self._decoder.bad
         values[6] = self.telemetry_dropped
-        values[7] = heap_free()
+        if app.mode == VENTED:  # counting takes longer than a tick
+            app.hands.slack()
+            self._heap_free = heap_free()
+        values[7] = self._heap_free
         values[8] = app.supply.pressure_pa
         values[9] = app.tables.crc
         values[10] = app.mode
+        values[11] = app.faults
+        test = app.self_test
+        values[12] = test.outcome
+        values[13] = test.untrue_zero
+        values[14] = test.unfilled
+        values[15] = test.unvented
         self._reply(0)
 
     def _show(self, count):
@@ -171,10 +181,13 @@ class Session:
         if count != board.BUBBLES:
             self._refuse(messages.WRONG_COUNT, 1, _NO_ELEMENT, count, board.BUBBLES, board.BUBBLES)
             return
-        for index in range(count):
-            if values[1 + index] > board.HEIGHT_MAX_UM:
-                self._refuse(messages.OUT_OF_RANGE, 1, index, values[1 + index], 0, board.HEIGHT_MAX_UM)
-                return
+        if self._app.faults & messages.VENTING:
+            self._refuse(messages.BOARD_FAULT, 0, _NO_ELEMENT, self._app.faults, 0, 0)
+            return
+        high = control.first_above(values, 1, 1 + count, board.HEIGHT_MAX_UM)
+        if high >= 0:
+            self._refuse(messages.OUT_OF_RANGE, 1, high - 1, values[high], 0, board.HEIGHT_MAX_UM)
+            return
         self._app.show(values, 1, values[0])
         self._acknowledge()
 
@@ -245,8 +258,23 @@ class Session:
         self._acknowledge()
 
     def _clear(self, count):
-        self._app.bubbles.clear_faults()
+        self._app.clear()
         self._acknowledge()
+
+    def _ticks(self, count):
+        app = self._app
+        values = self._values
+        values[0] = app.work_us
+        values[1] = app.delay_us
+        for index in range(BINS):
+            values[2 + 2 * index] = app.worked[index]
+            values[3 + 2 * index] = app.delayed[index]
+        self._reply(BINS)
+
+    def _restart(self, count):
+        into = self._values[0]
+        self._acknowledge()
+        self._app.restart(into)
 
     # Sending.
 
@@ -281,13 +309,20 @@ class Session:
         self._send(messages.ERROR, self._decoder.sequence, 0)
 
     def _telemetry(self):
-        count = self._fill_state()
         self._telemetry_sequence = (self._telemetry_sequence + 1) & 0xFFFF
-        if not self._send(messages.TELEMETRY, self._telemetry_sequence, count):
+        if self._owed:  # a reply comes first, and stands in the frame
+            self.telemetry_dropped += 1
+            return
+        length = self._pack(messages.TELEMETRY, self._telemetry_sequence, self._fill_state())
+        if not self._app.hands.send(self._frame, length):
             self.telemetry_dropped += 1
 
     def _send(self, message_id, sequence, count):
+        length = self._pack(message_id, sequence, count)
+        self._owed = 0 if self._app.hands.send(self._frame, length) else length
+
+    def _pack(self, message_id, sequence, count):
         frame = self._frame
         end = codec.BY_ID[message_id].pack(self._values, count, frame, framing.Decoder.PAYLOAD_AT)
         framing.put_header(frame, message_id, sequence)
-        return self._app.hands.send(frame, framing.seal(frame, end - 1, crc32_into))
+        return framing.seal(frame, end - 1, crc32_into)

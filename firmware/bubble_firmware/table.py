@@ -69,6 +69,17 @@ class Tables:
         values[at] = knots[byte] | knots[byte + 1] << 8
         values[at + 1] = knots[byte + 2] | knots[byte + 3] << 8
 
+    def pressures(self, bubble):
+        """The least and the greatest pressure in a table in use, Pa."""
+        start = bubble * KNOTS_MAX * KNOT_BYTES
+        knots = self.knots
+        least = most = knots[start + 2] | knots[start + 3] << 8
+        for at in range(start, start + self.sizes[bubble] * KNOT_BYTES, KNOT_BYTES):
+            pressure = knots[at + 2] | knots[at + 3] << 8
+            least = min(least, pressure)
+            most = max(most, pressure)
+        return least, most
+
     def first_flaw(self, height_max_um, pressure_max_pa):
         """Where the received set cannot be used: bubble * KNOTS_MAX + knot, or -1 where all is well.
 

@@ -8,7 +8,7 @@ from bubbleskin.link.session import drive
 from bubbleskin.link.transport import SerialTransport, Transport, only_attached
 from bubbleskin.skin import AsyncSkin, Skin
 
-SIMULATED = ("sim", "micropython")
+SIMULATED = ("sim", "micropython", "rp2040")
 NETWORK = ("socket", "rfc2217")
 
 
@@ -16,7 +16,8 @@ def connect(url: str | None = None, *, timeout: float = 2.0) -> Skin:
     """Open a wristband.
 
     `url`: a serial port (`/dev/ttyACM0`, `COM3`), `socket://host:port`, `rfc2217://host:port`, or a simulated
-    board: `sim://wristband7`, `micropython://wristband7`, with options such as `?seed=3&spread=0.1&realtime=1`.
+    board: `sim://wristband7`, `micropython://wristband7`, `rp2040://wristband7`, with options such as
+    `?seed=3&spread=0.1&realtime=1`.
     None is the only wristband attached. `timeout`: seconds within which the device must answer each request.
 
     Raises `InvalidInput` for a URL that cannot be meant, `LinkError` where nothing can be opened and

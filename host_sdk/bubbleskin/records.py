@@ -11,6 +11,12 @@ from bubbleskin.link.wire import SCHEMA_CRC, Received
 
 _MODES = {number: name for number, name, _ in messages.MODES}
 _STATUSES = {number: name for number, name, _ in messages.STATUSES}
+_SELF_TESTS = {number: name for number, name, _ in messages.SELF_TESTS}
+_TRANSLATED = {"mode", "board_faults", "self_test", "untrue_zero", "unfilled", "unvented"}
+
+
+def _bits(mask: int) -> tuple[int, ...]:
+    return tuple(bit for bit in range(32) if mask >> bit & 1)
 
 _NO_PRESSURE_KPA = 1.0
 """What an empty bubble may still have, or a sensor be off by: 0.03 mm."""
@@ -73,19 +79,53 @@ class Health:
     supply_kpa: float
     tables_crc: int
     mode: str
+    board_faults: tuple[str, ...]
+    """Faults of the board as a whole, such as emergency_stop or watchdog; they stay until `clear_faults`."""
+    self_test: str
+    """not_run, running, passed, failed or skipped."""
+    untrue_zero: tuple[int, ...]
+    """Bubbles whose sensor was off or silent without pressure, in the self-test."""
+    unfilled: tuple[int, ...]
+    """Bubbles that a fill pulse did not reach."""
+    unvented: tuple[int, ...]
+    """Bubbles that did not vent."""
 
     @classmethod
     def of(cls, reply: Received, tick: float) -> Self:
         """From the reply to INFO."""
         names = {field.name for field in fields(cls)} & set(reply.fields)
-        same: dict[str, Any] = {name: reply[name] for name in names - {"mode"}}
+        same: dict[str, Any] = {name: reply[name] for name in names - _TRANSLATED}
         return cls(
             time=reply["ticks"] * tick,
             tick_worst=reply["tick_worst_us"] * 1e-6,
             supply_kpa=reply["supply_pa"] / 1000,
             mode=_MODES.get(reply["mode"], "unknown"),
+            board_faults=tuple(name for bit, name, _ in messages.BOARD_FAULTS if reply["board_faults"] & bit),
+            self_test=_SELF_TESTS[reply["self_test"]],
+            untrue_zero=_bits(reply["untrue_zero"]),
+            unfilled=_bits(reply["unfilled"]),
+            unvented=_bits(reply["unvented"]),
             **same,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class TickHistogram:
+    """How long ticks took and how late they began, since boot; bins (k,) of equal width, the last one open above."""
+
+    work_bin: float
+    """Width of a bin of `worked`, s."""
+    delay_bin: float
+    """Width of a bin of `delayed`, s."""
+    worked: NDArray[np.int64]
+    """Ticks by how long they took."""
+    delayed: NDArray[np.int64]
+    """Ticks by how long after their period they began."""
+
+    @classmethod
+    def of(cls, reply: Received) -> Self:
+        """From the reply to TICKS."""
+        return cls(reply["work_us"] * 1e-6, reply["delay_us"] * 1e-6, reply.columns["worked"], reply.columns["delayed"])
 
 
 @dataclass(frozen=True, eq=False)

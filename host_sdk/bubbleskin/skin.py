@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from bubble_protocol import messages
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.session import Link, drive
 from bubbleskin.link.transport import Transport
 from bubbleskin.link.wire import crc32
-from bubbleskin.records import Health, Info, State
+from bubbleskin.records import Health, Info, State, TickHistogram
 from bubbleskin.shape.heightfield import Heights, sample
 
 if TYPE_CHECKING:
@@ -77,7 +78,9 @@ class AsyncSkin:
                 what = "; ".join(f"bubble {bubble}: {', '.join(state.faults[bubble])}" for bubble in ill)
                 raise DeviceFault(f"The wristband reports faults ({what}). Mend the cause, then `clear_faults()`.")
             if state.mode != "active":
-                raise DeviceFault(f"The wristband is {state.mode} in the middle of a show: it was stopped or vented.")
+                faults = ", ".join((await self.health()).board_faults)
+                why = f"faults of the board: {faults}." if faults else "it was stopped or vented."
+                raise DeviceFault(f"The wristband is {state.mode} in the middle of a show: {why}")
             if state.settled:
                 return state
             if self._link.transport.now() >= deadline:
@@ -96,6 +99,17 @@ class AsyncSkin:
     async def health(self) -> Health:
         """See `Skin.health`."""
         return Health.of(await self._link.call("INFO"), self.info.tick)
+
+    async def tick_histogram(self) -> TickHistogram:
+        """See `Skin.tick_histogram`."""
+        return TickHistogram.of(await self._link.call("TICKS"))
+
+    async def restart(self, into: str = "firmware") -> None:
+        """See `Skin.restart`."""
+        numbers = {name: number for number, name, _ in messages.RESTARTS}
+        if into not in numbers:
+            raise InvalidInput(f"A wristband cannot restart into {into!r}; choose one of {', '.join(numbers)}.")
+        await self._link.call("RESTART", (numbers[into],))
 
     async def telemetry(self, rate_hz: float = 20) -> AsyncGenerator[State]:
         """See `Skin.telemetry`."""
@@ -240,8 +254,16 @@ class Skin:
         return drive(self._skin.state())
 
     def health(self) -> Health:
-        """Counters since boot: late ticks, exceptions, frames, free heap, supply pressure."""
+        """Counters since boot, free heap, supply pressure, faults of the board, outcome of the self-test."""
         return drive(self._skin.health())
+
+    def tick_histogram(self) -> TickHistogram:
+        """How long the device's ticks took and how late they began, since boot."""
+        return drive(self._skin.tick_histogram())
+
+    def restart(self, into: str = "firmware") -> None:
+        """Vent and start again, into the `firmware`, the `boot_loader` or MicroPython's `prompt`; then connect anew."""
+        drive(self._skin.restart(into))
 
     def telemetry(self, rate_hz: float = 20) -> Iterator[State]:
         """States as the device sends them, without end; close the iterator or leave the loop to end it.
@@ -270,7 +292,7 @@ class Skin:
         return drive(self._skin.faults())
 
     def clear_faults(self) -> None:
-        """Forget all faults; a bubble that still has one faults again."""
+        """Forget all faults, the board's too; what still is wrong faults again."""
         drive(self._skin.clear_faults())
 
     def upload_tables(self, tables: "Sequence[Table] | Table | Calibration") -> None:

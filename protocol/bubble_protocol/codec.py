@@ -1,53 +1,71 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """Payloads to integers and back, driven by the schema; the same code on host and device.
 
 Values travel in an `array('i')` in schema order: fixed fields first, then the repeated group over and
 over. A text takes 16 values. An unsigned 32-bit value above 2**31 - 1 stands in it as its two's complement.
 """
 
+from array import array
+
 from bubble_protocol.messages import MESSAGES, TEXT
 from bubble_protocol.portable import micropython, ptr8, ptr32
 
 
 @micropython.viper
-def _pack(kinds, start: int, end: int, values, at: int, payload, index: int) -> int:
-    """Write one value per kind in `kinds[start:end]`; returns the index after them."""
-    kind = ptr8(kinds)
-    value = ptr32(values)
-    out = ptr8(payload)
-    while start < end:
-        rest = value[at]
-        size = kind[start] & 15
-        while size > 0:
-            out[index] = rest & 255
-            rest >>= 8
-            index += 1
-            size -= 1
-        at += 1
-        start += 1
+def _pack(kind: ptr8, value: ptr32, out: ptr8, kinds: int, times: int, at: int, index: int) -> int:
+    """Write one value per kind, `times` over, from `value[at:]` to `out[index:]`; returns the index after them."""
+    while times > 0:
+        i = 0
+        while i < kinds:
+            rest = value[at]
+            size = kind[i] & 15
+            while size > 0:
+                out[index] = rest & 255
+                rest >>= 8
+                index += 1
+                size -= 1
+            at += 1
+            i += 1
+        times -= 1
     return index
 
 
 @micropython.viper
-def _unpack(kinds, start: int, end: int, values, at: int, payload, index: int) -> int:
-    """Read one value per kind in `kinds[start:end]`; returns the index after them."""
-    kind = ptr8(kinds)
-    value = ptr32(values)
-    data = ptr8(payload)
-    while start < end:
-        size = kind[start] & 15
-        top = data[index + size - 1]
-        if top > 127 and (size == 4 or kind[start] > 127):
-            top -= 256
-        rest = top
-        step = size - 2
-        while step >= 0:
-            rest = rest << 8 | data[index + step]
-            step -= 1
-        value[at] = rest
-        index += size
-        at += 1
-        start += 1
+def _unpack(kind: ptr8, value: ptr32, data: ptr8, kinds: int, times: int, at: int, index: int) -> int:
+    """Read one value per kind, `times` over, from `data[index:]` to `value[at:]`; returns the index after them."""
+    while times > 0:
+        i = 0
+        while i < kinds:
+            size = kind[i] & 15
+            top = data[index + size - 1]
+            if top > 127 and (size == 4 or kind[i] > 127):
+                top -= 256
+            rest = top
+            step = size - 2
+            while step >= 0:
+                rest = rest << 8 | data[index + step]
+                step -= 1
+            value[at] = rest
+            index += size
+            at += 1
+            i += 1
+        times -= 1
     return index
+
+
+@micropython.viper
+def _outside(value: ptr32, lows: ptr32, highs: ptr32, fixed: int, stride: int, end: int) -> int:
+    """The index of the first value that is not within its limits, -1 where there is none."""
+    i = 0
+    limit = 0
+    while i < end:
+        if value[i] < lows[limit] or value[i] > highs[limit]:
+            return i
+        i += 1
+        limit += 1
+        if limit == fixed + stride:
+            limit = fixed
+    return -1
 
 
 def _expand(fields):
@@ -60,6 +78,15 @@ def _expand(fields):
         else:
             kinds.append(field[1])
     return bytes(kinds)
+
+
+def _limits(fields, which, none):
+    """One limit per value, `none` where every value is allowed."""
+    limits = array("i")
+    for field in fields:
+        for _ in range(16 if field[1] == TEXT else 1):
+            limits.append(none if field[which] is None else field[which])
+    return limits
 
 
 class Message:
@@ -75,6 +102,8 @@ class Message:
         self._repeated_kinds = _expand(repeated)
         self.fixed_values = len(self._fixed_kinds)
         self.stride_values = len(self._repeated_kinds)
+        self._lows = _limits(fixed + repeated, 3, -0x80000000)
+        self._highs = _limits(fixed + repeated, 4, 0x7FFFFFFF)
         self.fixed_size = sum(kind & 15 for kind in self._fixed_kinds)
         self.stride = sum(kind & 15 for kind in self._repeated_kinds)
 
@@ -89,23 +118,24 @@ class Message:
 
     def pack(self, values, count, payload, index):
         """Write the fixed fields and `count` repetitions to `payload[index:]`; returns the index after them."""
-        index = _pack(self._fixed_kinds, 0, self.fixed_values, values, 0, payload, index)
-        at = self.fixed_values
-        for _ in range(count):
-            index = _pack(self._repeated_kinds, 0, self.stride_values, values, at, payload, index)
-            at += self.stride_values
+        index = _pack(self._fixed_kinds, values, payload, self.fixed_values, 1, 0, index)
+        if count:
+            index = _pack(self._repeated_kinds, values, payload, self.stride_values, count, self.fixed_values, index)
         return index
 
     def unpack(self, payload, index, size, values):
         """Read `payload[index:index + size]` into `values`; returns the repetitions, -1 where the size is wrong."""
         count = self.count(size)
         if count >= 0:
-            index = _unpack(self._fixed_kinds, 0, self.fixed_values, values, 0, payload, index)
-            at = self.fixed_values
-            for _ in range(count):
-                index = _unpack(self._repeated_kinds, 0, self.stride_values, values, at, payload, index)
-                at += self.stride_values
+            index = _unpack(self._fixed_kinds, values, payload, self.fixed_values, 1, 0, index)
+        if count > 0:
+            _unpack(self._repeated_kinds, values, payload, self.stride_values, count, self.fixed_values, index)
         return count
+
+    def outside(self, values, count):
+        """The index of the first of `values` that is outside the schema's limits, -1 where all are within."""
+        end = self.fixed_values + count * self.stride_values
+        return _outside(values, self._lows, self._highs, self.fixed_values, self.stride_values, end)
 
 
 BY_ID = {data[0]: Message(*data) for data in MESSAGES}

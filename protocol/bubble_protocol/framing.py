@@ -1,3 +1,4 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """Frames on the wire: COBS around (id, sequence number, payload, CRC-32), one 0x00 after each.
 
     | 1      | 1  | 2        | 0..247  | 4      | 1    |
@@ -10,6 +11,8 @@ Nothing here allocates once made, reads a clock or does I/O. `crc32_into(buffer,
 the caller's: crcmod on the host, `bubble_protocol.crc` on the device.
 """
 
+from bubble_protocol.portable import micropython, ptr8
+
 HEADER = 3  # id, sequence number
 CRC = 4
 CONTENT_MAX = 254
@@ -21,6 +24,38 @@ _ZERO = b"\x00"
 _SHORTEST = 1 + HEADER + CRC  # without the delimiter
 
 
+@micropython.viper
+def _stuff(frame: ptr8, end: int):
+    """Put the distance to the next zero in place of every zero of `frame[0:end]`; one stands at `end`."""
+    at = 0
+    i = 1
+    while i <= end:
+        if frame[i] == 0:
+            frame[at] = i - at
+            at = i
+        i += 1
+
+
+@micropython.viper
+def _unstuff(frame: ptr8, used: int) -> int:
+    """Walk from zero to zero and put them back; whether the walk ends where the frame does."""
+    at = 0
+    while at < used:
+        step = frame[at]
+        frame[at] = 0
+        at += step
+    return 1 if at == used else 0
+
+
+@micropython.viper
+def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
+    """`target[at:] = source[start:end]`, without slices."""
+    while start < end:
+        target[at] = source[start]
+        at += 1
+        start += 1
+
+
 def seal(frame, length, crc32_into):
     """Finish the frame whose id, sequence number and payload stand at `frame[1:1 + length]`.
 
@@ -29,11 +64,7 @@ def seal(frame, length, crc32_into):
     end = 1 + length + CRC
     crc32_into(frame, 1, 1 + length, frame, 1 + length)
     frame[end] = 0
-    at = 0
-    while at < end:
-        zero = frame.find(_ZERO, at + 1, end + 1)
-        frame[at] = zero - at
-        at = zero
+    _stuff(frame, end)
     return end + 1
 
 
@@ -87,10 +118,8 @@ class Decoder:
         if used + last - start > FRAME_MAX - 1:
             used = FRAME_MAX
         else:
-            frame = self.frame
-            for index in range(start, last):
-                frame[used] = data[index]
-                used += 1
+            copy(data, start, last, self.frame, used)
+            used += last - start
         if stop < 0:
             self._used = used
             return end
@@ -107,12 +136,7 @@ class Decoder:
         if used < _SHORTEST or used >= FRAME_MAX:
             return False
         frame = self.frame
-        at = 0
-        while at < used:  # walk from zero to zero and put them back
-            step = frame[at]
-            frame[at] = 0
-            at += step
-        if at != used:
+        if not _unstuff(frame, used):
             return False
         crc = self._crc
         crc_at = used - CRC

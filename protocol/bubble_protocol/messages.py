@@ -14,10 +14,12 @@ REPLY = 0x80
 
 HELLO, PING, INFO, SHOW, STATE, SUBSCRIBE, TELEMETRY = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
 TABLE_WRITE, TABLE_COMMIT, TABLE_READ, STOP, VENT, CLEAR = 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D
+TICKS, RESTART = 0x0E, 0x0F
 ERROR = 0x7F
 
 # What ERROR says went wrong.
 UNKNOWN_MESSAGE, WRONG_LENGTH, OUT_OF_RANGE, WRONG_COUNT, BAD_TABLE, BAD_CRC, NO_COMMON_PROTOCOL, FAULTED = range(1, 9)
+BOARD_FAULT = 9
 ERRORS = (
     (UNKNOWN_MESSAGE, "unknown_message", "no message has this id"),
     (WRONG_LENGTH, "wrong_length", "the payload is too short or too long: asked bytes, low to high allowed"),
@@ -27,6 +29,7 @@ ERRORS = (
     (BAD_CRC, "bad_crc", "the tables received are not the tables sent"),
     (NO_COMMON_PROTOCOL, "no_common_protocol", "asked is the host's newest, low to high the device's"),
     (FAULTED, "faulted", "the device failed at this request and vents"),
+    (BOARD_FAULT, "board_fault", "a fault of the board forbids it: asked are its bits; mend the cause, then CLEAR"),
 )
 
 # What the board as a whole is doing.
@@ -53,6 +56,41 @@ FAULTS = (
     (OVERPRESSURE, "overpressure", "pressure above the board's limit"),
     (SENSOR_LOST, "sensor_lost", "the sensor reads the end of its range: broken wire or missing chip"),
     (VALVE_TIME, "valve_time", "the fill valve was open longer than the board allows at a time"),
+)
+
+# Faults of the board as a whole, as bits. They stay until CLEAR.
+ESTOP, SUPPLY_LOST, VALVE_CHIP, SENSOR_CHIP, EXCEPTION, WATCHDOG, SELF_TEST = 1, 2, 4, 8, 16, 32, 64
+BOARD_FAULTS = (
+    (ESTOP, "emergency_stop", "the emergency stop is pressed, or its loop is broken: everything vents"),
+    (
+        SUPPLY_LOST,
+        "supply_lost",
+        "the reservoir stays below the pressure that is needed: bubbles are held as well as can be",
+    ),
+    (VALVE_CHIP, "valve_chip", "a valve driver does not answer: everything vents"),
+    (SENSOR_CHIP, "sensor_chip", "a converter does not answer: its bubbles vent"),
+    (EXCEPTION, "exception", "an exception in the firmware: everything vented"),
+    (WATCHDOG, "watchdog", "the firmware hung and was restarted by the watchdog: everything vented"),
+    (SELF_TEST, "self_test", "the self-test at boot found a sensor or a valve that does not work, see INFO"),
+)
+VENTING = ESTOP | VALVE_CHIP  # while one of these stands, SHOW is refused
+
+# What has become of the self-test at boot.
+NOT_RUN, RUNNING, PASSED, FAILED, SKIPPED = range(5)
+SELF_TESTS = (
+    (NOT_RUN, "not_run", "this board has none"),
+    (RUNNING, "running", "under way"),
+    (PASSED, "passed", "every sensor and valve works"),
+    (FAILED, "failed", "some do not, see the bits"),
+    (SKIPPED, "skipped", "valves not tested: no supply pressure, an emergency stop, or a SHOW came first"),
+)
+
+# What RESTART leads to.
+FIRMWARE, BOOT_LOADER, PROMPT = range(3)
+RESTARTS = (
+    (FIRMWARE, "firmware", "the firmware from its beginning"),
+    (BOOT_LOADER, "boot_loader", "the chip's USB drive that takes a UF2"),
+    (PROMPT, "prompt", "MicroPython's prompt"),
 )
 
 _TICKS = ("ticks", U32, "ticks", None, None, "device time: ticks since boot")
@@ -132,6 +170,11 @@ MESSAGES = (
             ("supply_pa", I32, "Pa", None, None, "gauge pressure of the reservoir"),
             ("tables_crc", U32, "", None, None, "CRC-32 of the tables in use"),
             ("mode", U8, "", None, None, "see mode"),
+            ("board_faults", U8, "", None, None, "see board faults, bits"),
+            ("self_test", U8, "", None, None, "see self-test"),
+            ("untrue_zero", U32, "", None, None, "bubbles, as bits, whose sensor was off or silent without pressure"),
+            ("unfilled", U32, "", None, None, "bubbles, as bits, that a fill pulse did not reach"),
+            ("unvented", U32, "", None, None, "bubbles, as bits, that did not vent"),
         ),
         (),
         "counters and health",
@@ -220,6 +263,42 @@ MESSAGES = (
     (VENT | REPLY, "VENT_REPLY", (_TICKS,), (), "venting"),
     (CLEAR, "CLEAR", (), (), "forget all faults; bubbles that still have one fault again"),
     (CLEAR | REPLY, "CLEAR_REPLY", (_TICKS,), (), "faults cleared"),
+    (TICKS, "TICKS", (), (), "how long do ticks take, how late do they begin?"),
+    (
+        TICKS | REPLY,
+        "TICKS_REPLY",
+        (
+            ("work_us", U16, "µs", None, None, "width of a bin of worked"),
+            ("delay_us", U16, "µs", None, None, "width of a bin of delayed"),
+        ),
+        (
+            (
+                "worked",
+                I32,
+                "ticks",
+                None,
+                None,
+                "ticks that took so many times work_us; the last bin also takes longer ones",
+            ),
+            (
+                "delayed",
+                I32,
+                "ticks",
+                None,
+                None,
+                "ticks that began so many times delay_us after their period; likewise",
+            ),
+        ),
+        "histograms since boot",
+    ),
+    (
+        RESTART,
+        "RESTART",
+        (("into", U8, "", 0, 2, "see restart"),),
+        (),
+        "vent and start again; answered first",
+    ),
+    (RESTART | REPLY, "RESTART_REPLY", (_TICKS,), (), "restarting"),
     (
         ERROR,
         "ERROR",

@@ -7,12 +7,13 @@ overflow in an `array('i')` raises there, which is how the tests would find it.
 """
 
 import gc
+from array import array
 
 try:
     import micropython
     from micropython import const
 
-    ptr8 = ptr16 = ptr32 = None
+    ptr8 = ptr16 = ptr32 = uint = None
 
     def heap_free():
         """Free bytes of the garbage collected heap."""
@@ -25,8 +26,19 @@ except ImportError:
 
         @staticmethod
         def viper(function):
-            """Leave the function as it is."""
-            return function
+            """Leave the function as it is, but for casting the arguments that are annotated as pointers."""
+            code = function.__code__
+            casts = []
+            for name in code.co_varnames[: code.co_argcount]:
+                kind = function.__annotations__.get(name)
+                casts.append(kind if kind in (ptr8, ptr16, ptr32) else None)
+            if not any(casts):
+                return function
+
+            def called(*arguments):
+                return function(*[cast(a) if cast else a for cast, a in zip(casts, arguments, strict=True)])
+
+            return called
 
     def const(value):
         """Leave the value as it is."""
@@ -41,8 +53,24 @@ except ImportError:
         return memoryview(buffer).cast("B").cast("H")
 
     def ptr32(buffer):
-        """An `array('i')` as signed 32-bit words."""
-        return buffer
+        """An `array('i')`, or what `uint` made of one, as signed 32-bit words."""
+        if isinstance(buffer, _Address):
+            return buffer.words[buffer.at >> 2 :]
+        return memoryview(buffer) if isinstance(buffer, array) else buffer
+
+    class _Address:
+        """A pointer as a number, good for adding bytes to."""
+
+        def __init__(self, words, at=0):
+            self.words = words
+            self.at = at
+
+        def __add__(self, size):
+            return _Address(self.words, self.at + size)
+
+    def uint(pointer):
+        """The address in a pointer."""
+        return _Address(pointer)
 
     def heap_free():
         """Free bytes of the heap: 0, CPython's heap has no fixed size."""

@@ -15,6 +15,9 @@ class Hands:
     """What `bubble_firmware.app` calls, on stdin and stdout of this interpreter."""
 
     late_ticks = 0
+    alarms = 0
+    boot_faults = 0
+    self_test = False
 
     def __init__(self, bubbles, boot_id):
         self.boot_id = boot_id
@@ -83,6 +86,21 @@ class Hands:
             out[at + index] = frame[index]
         self._sent += length
         return True
+
+    def alive(self, mode, faults):
+        """There is no watchdog."""
+
+    def clear(self):
+        """Nothing here fails."""
+
+    def slack(self):
+        """Time stands still within a tick."""
+
+    def tidy(self):
+        """The interpreter collects by itself."""
+
+    def restart(self, into):
+        """There is nothing to start again from."""
 
     def phase_us(self):
         """Time stands still within a tick."""

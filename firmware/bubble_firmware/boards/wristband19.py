@@ -11,6 +11,7 @@ PRESSURE_MAX_PA = 42000  # 14 mm takes 34 kPa, air in motion 5 kPa more
 FILL_MAX_US = 1000000  # longest a fill valve may stay open at a time; 5 to 14 mm takes 0.4 s
 SUPPLY_PA = 60000
 SUPPLY_MAX_PA = 75000
+SUPPLY_LOW_PA = 45000  # less for long and the supply is lost: a bubble at its limit could not be filled
 
 # Sensors: counts to pascals.
 SENSOR_ZERO = 160
@@ -36,3 +37,20 @@ GAIN_I = 4
 GAIN_D = 16
 DEADBAND_UM = 60  # no dose for less
 SETTLED_UM = 120  # a bubble this near its target counts as there
+
+# The chip: numbers are GPIOs. docs/hardware.md has the wiring and the reasons.
+VALVES = "pca9685"
+PIN_SDA = 4  # I2C0, 1 MHz
+PIN_SCL = 5
+PIN_CLOCK = 21  # GPOUT0: the clock of all PCA9685, so that their periods are the tick's
+DRIVERS = ((0x40, 7), (0x41, 6), (0x42, 6))  # address and bubbles of each PCA9685
+PIN_PUMP = 14  # PWM slice 7, channel A
+PIN_DUMP = 15  # high: open
+PIN_MISO = 16  # SPI0
+PIN_SCK = 18
+PIN_MOSI = 19
+CONVERTERS = ((17, 7), (22, 6), (27, 6))  # chip select and channels in use of each MCP3208
+PIN_DISABLE = 20  # /OE of all PCA9685, pulled up: low lets the valves work
+PIN_ESTOP = 28  # pulled up; the loop through the button holds it low, pressed or broken lets it rise
+PIN_LED = 25
+PIN_SUPPLY = 26  # ADC0

@@ -130,6 +130,9 @@ def explain(error: Received) -> str:
         return f"The wristband refused {name}: what it received is not what was sent. Upload the tables again."
     if code == messages.FAULTED:
         return f"The wristband failed at {name} and vents. `bubbleskin info` counts its exceptions."
+    if code == messages.BOARD_FAULT:
+        faults = [sentence for bit, _, sentence in messages.BOARD_FAULTS if asked & bit & messages.VENTING]
+        return f"The wristband refused {name}: {'; '.join(faults)}. Mend the cause, then `clear_faults()`."
     if code == messages.UNKNOWN_MESSAGE:
         return f"The wristband does not know {name}: its firmware is older than this SDK. Update the firmware."
     return f"The wristband refused {name} with error {code}."

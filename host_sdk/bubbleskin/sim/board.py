@@ -44,6 +44,9 @@ class InProcessFirmware:
     """The firmware in this very interpreter. It is also the `hands` of the firmware's `App`."""
 
     late_ticks = 0
+    alarms = 0
+    boot_faults = 0
+    self_test = False
 
     def __init__(self, board: ModuleType, boot_id: int):
         self.boot_id = boot_id
@@ -91,6 +94,21 @@ class InProcessFirmware:
         """Queue a frame; there is always room."""
         self._out += frame[:length]
         return True
+
+    def alive(self, mode: int, faults: int) -> None:
+        """There is no watchdog."""
+
+    def clear(self) -> None:
+        """Nothing here fails by itself."""
+
+    def slack(self) -> None:
+        """Time stands still within a tick."""
+
+    def tidy(self) -> None:
+        """The interpreter collects by itself."""
+
+    def restart(self, into: int) -> None:
+        """There is nothing to start again from."""
 
     def phase_us(self) -> int:
         """Time stands still within a tick."""

@@ -7,8 +7,7 @@ import socket
 from collections.abc import Callable, Iterator
 
 from bubbleskin.errors import InvalidInput, LinkError
-from bubbleskin.sim.board import SimulatedBoard
-from bubbleskin.sim.transport import Pace
+from bubbleskin.sim.transport import Board, Pace
 
 _OUT_MAX = 65536  # bytes kept for a program that does not read; older ones are dropped, as a full USB buffer does
 
@@ -104,9 +103,7 @@ class TcpEnd:
         self._client = None
 
 
-def serve(
-    board: SimulatedBoard, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lambda: True
-) -> Iterator[SimulatedBoard]:
+def serve(board: Board, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lambda: True) -> Iterator[Board]:
     """Run `board` at the wall clock's pace behind `end` for as long as `running()`; yields the board after every tick."""
     pace = Pace(board)
     out = bytearray()

@@ -2,17 +2,36 @@
 
 import time
 from dataclasses import dataclass
+from typing import Protocol
 
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.sim.board import SimulatedBoard, load_board
+
+
+class Board(Protocol):
+    """What a link needs of a board that is simulated, one way or another."""
+
+    to_device: bytearray
+    from_device: bytearray
+
+    @property
+    def time(self) -> float:
+        """Virtual seconds since the start."""
+
+    def tick(self) -> None:
+        """Let one period pass."""
+
+    def close(self) -> None:
+        """End it."""
+
 
 _BEHIND = 0.1  # seconds a real-time simulation may lag before it gives up catching up
 
 
 class SimulatedTransport:
-    """A `Transport` to a `SimulatedBoard`. With `realtime`, virtual time keeps pace with the wall's."""
+    """A `Transport` to a simulated board. With `realtime`, virtual time keeps pace with the wall's."""
 
-    def __init__(self, board: SimulatedBoard, name: str, realtime: bool = False):
+    def __init__(self, board: Board, name: str, realtime: bool = False):
         self.board = board
         self.name = name
         self.blocks = realtime
@@ -54,7 +73,7 @@ class SimulatedTransport:
 class Pace:
     """Keeps a board's virtual time at the wall's, tick by tick."""
 
-    def __init__(self, board: SimulatedBoard):
+    def __init__(self, board: Board):
         self._board = board
         self._start = time.monotonic() - board.time
 
@@ -97,11 +116,16 @@ class Options:
         return cls(int(values.get("seed", 0)), values.get("spread", 0.0), bool(values.get("realtime", 0)))
 
 
-def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[SimulatedTransport, SimulatedBoard]:
-    """The board of `sim://name?…` or `micropython://name?…`, and the link to it."""
+def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[SimulatedTransport, Board]:
+    """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it."""
     url = f"{scheme}://{name}"
     chosen = Options.parse(options, url)
     data = load_board(name)
+    if scheme == "rp2040":
+        from bubbleskin.sim.rp2040 import open_chip
+
+        chip = open_chip(name, seed=chosen.seed, spread=chosen.spread)
+        return SimulatedTransport(chip, url, chosen.realtime), chip
     firmware = None
     if scheme == "micropython":
         from bubbleskin.sim.micropython import MicroPythonFirmware

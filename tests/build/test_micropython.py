@@ -1,6 +1,5 @@
 """The parts of the MicroPython build that need neither network nor compiler."""
 
-import importlib.util
 import os
 import subprocess
 import sys
@@ -9,14 +8,10 @@ from pathlib import Path
 import pytest
 
 from bubbleskin import interpreter
+from bubbleskin.build import debian, steps, unix
 from bubbleskin.errors import BubbleskinError
 
 TOOL = Path(__file__).parents[2] / "tools" / "build_micropython.py"
-spec = importlib.util.spec_from_file_location("build_micropython", TOOL)
-assert spec
-assert spec.loader
-tool = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(tool)
 
 DEB822 = """\
 # the archive
@@ -55,7 +50,7 @@ deb http://flat.example/ ./
 """
 
 TRIXIE = """\
-Types: deb-src
+Types: deb deb-src
 Suites: trixie
 Components: main
 Uris: http://mirror.example/debian
@@ -70,22 +65,24 @@ def program(path: Path, answer: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("stanzas", [tool.read_deb822(DEB822), tool.read_one_line(ONE_LINE)])
+@pytest.mark.parametrize("stanzas", [debian.read_deb822(DEB822), debian.read_one_line(ONE_LINE)])
 def test_only_the_debian_archive_is_turned_to_the_other_suite(stanzas):
-    assert tool.turn_to_suite(stanzas, "trixie") == TRIXIE
+    assert debian.turn_to_suite(stanzas, "trixie") == TRIXIE
 
 
 def test_a_key_written_into_the_sources_file_is_kept():
     text = DEB822.replace("/usr/share/keyrings/archive.gpg", "\n -----BEGIN\n .\n mQIN\n -----END", 1)
-    assert "Signed-By: \n -----BEGIN\n .\n mQIN\n -----END\n" in tool.turn_to_suite(tool.read_deb822(text), "trixie")
+    assert "Signed-By: \n -----BEGIN\n .\n mQIN\n -----END\n" in debian.turn_to_suite(
+        debian.read_deb822(text), "trixie"
+    )
 
 
 def test_a_source_without_a_key_gets_debians_own(monkeypatch, tmp_path):
     keyring = tmp_path / "debian.gpg"
     keyring.touch()
-    monkeypatch.setattr(tool, "KEYRING", keyring)
-    stanzas = tool.read_one_line("deb http://mirror.example/debian bullseye main")
-    assert f"Signed-By: {keyring}\n" in tool.turn_to_suite(stanzas, "trixie")
+    monkeypatch.setattr(debian, "KEYRING", keyring)
+    stanzas = debian.read_one_line("deb http://mirror.example/debian bullseye main")
+    assert f"Signed-By: {keyring}\n" in debian.turn_to_suite(stanzas, "trixie")
 
 
 def test_the_key_of_a_build_names_version_and_word_size_and_follows_the_options(monkeypatch):
@@ -119,11 +116,11 @@ def test_a_wrong_micropython_is_named(monkeypatch, tmp_path):
 
 
 def test_an_interpreter_that_differs_from_the_rp2040_is_refused(tmp_path):
-    assert tool.prove(program(tmp_path / "right", "-9 True True 1.25.0")) == "1.25.0"
+    assert unix.prove(program(tmp_path / "right", "-9 True True 1.25.0")) == "1.25.0"
     with pytest.raises(BubbleskinError, match=r"is MicroPython 1\.25\.0, but not a 32-bit build"):
-        tool.prove(program(tmp_path / "wide", "8589934583 True False 1.25.0"))
+        unix.prove(program(tmp_path / "wide", "8589934583 True False 1.25.0"))
     with pytest.raises(BubbleskinError, match="is not a MicroPython with viper"):
-        tool.prove(Path(sys.executable))
+        unix.prove(Path(sys.executable))
 
 
 def test_the_interpreter_of_this_machine_is_like_the_rp2040():
@@ -131,20 +128,20 @@ def test_the_interpreter_of_this_machine_is_like_the_rp2040():
         path = interpreter.find_micropython()
     except BubbleskinError as problem:
         pytest.skip(str(problem))
-    assert tool.prove(path)
+    assert unix.prove(path)
 
 
 def test_machines_that_cannot_build_are_told_why():
-    assert tool.unsupported("Linux", "x86_64") is None
-    assert "this is Darwin" in tool.unsupported("Darwin", "arm64")
-    assert "this one is aarch64" in tool.unsupported("Linux", "aarch64")
+    assert unix.unsupported("Linux", "x86_64") is None
+    assert "this is Darwin" in unix.unsupported("Darwin", "arm64")
+    assert "this one is aarch64" in unix.unsupported("Linux", "aarch64")
 
 
 def test_a_checkout_without_micropython_is_refused_before_anything_is_fetched(monkeypatch, tmp_path):
     monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(tool, "unsupported", lambda system, machine: None)
+    monkeypatch.setattr(unix, "unsupported", lambda system, machine: None)
     with pytest.raises(BubbleskinError, match=r"not a MicroPython checkout.*\n.*MICROPYTHON="):
-        tool.micropython(tmp_path)
+        unix.micropython(tmp_path)
     assert not (tmp_path / "cache").exists()
 
 
@@ -158,10 +155,10 @@ def test_the_tool_says_one_sentence_and_fails(tmp_path):
 
 
 def test_a_failed_step_shows_the_end_of_its_log(tmp_path):
-    steps = tool.Steps(tmp_path)
+    run = steps.Steps(tmp_path).run
     script = "for line in range(30): print('line', line)\nraise SystemExit(3)"
     with pytest.raises(BubbleskinError) as failure:
-        steps.run("Counting", [sys.executable, "-c", script])
+        run("Counting", [sys.executable, "-c", script])
     text = str(failure.value)
     assert "line 29" in text
     assert "line 10" in text

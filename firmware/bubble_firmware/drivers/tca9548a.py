@@ -1,0 +1,24 @@
+"""TCA9548A: one I2C bus to eight (Texas Instruments SCPS207, section 8.5): its one register has a bit per channel.
+
+`bus` is a `machine.I2C`, which raises OSError when a chip does not answer.
+"""
+
+
+class Tca9548a:
+    """The switch at `address`. `missing`: it did not answer the last time."""
+
+    def __init__(self, bus, address=0x70):
+        self.missing = False
+        self._bus = bus
+        self._address = address
+        self._mask = bytearray(1)
+
+    def select(self, mask):
+        """Connect the channels whose bits are set in `mask`; says whether the switch has answered."""
+        self._mask[0] = mask
+        try:
+            self._bus.writeto(self._address, self._mask)
+            self.missing = False
+        except OSError:
+            self.missing = True
+        return not self.missing

@@ -1,0 +1,66 @@
+"""The chip's firmware: what decides its bytes, and that nothing else does."""
+
+import os
+import shutil
+
+import pytest
+
+from bubbleskin.build import rp2040
+from bubbleskin.errors import BubbleskinError
+
+FILES = {"firmware/manifest.py": b"1", "firmware/bubble_firmware/main.py": b"2"}
+
+
+def test_the_key_follows_board_compiler_and_every_byte_that_is_frozen():
+    keys = {
+        rp2040.key("wristband7", "12.2.1", FILES),
+        rp2040.key("wristband19", "12.2.1", FILES),
+        rp2040.key("wristband7", "13.2.1", FILES),
+        rp2040.key("wristband7", "12.2.1", {**FILES, "firmware/manifest.py": b"3"}),
+        rp2040.key("wristband7", "12.2.1", {**FILES, "x.py": b""}),
+    }
+    assert len(keys) == 5
+    assert rp2040.key("wristband7", "12.2.1", dict(reversed(FILES.items()))) in keys
+
+
+def test_both_packages_and_the_manifest_are_frozen():
+    files = rp2040.device_files()
+    assert {"manifest.py", "firmware/manifest.py", "firmware/bubble_firmware/main.py"} <= set(files)
+    assert "protocol/bubble_protocol/codec.py" in files
+    assert not any("__pycache__" in name or name.startswith("/") for name in files)
+
+
+def test_staging_touches_only_what_has_changed(tmp_path):
+    rp2040.stage(tmp_path, "wristband7", {**FILES, "firmware/bubble_firmware/old.py": b"4"})
+    main = tmp_path / "staging/firmware/bubble_firmware/main.py"
+    os.utime(main, (1, 1))
+    manifest = rp2040.stage(tmp_path, "wristband19", FILES)
+    assert manifest == tmp_path / "staging/manifest.py"
+    assert main.stat().st_mtime == 1
+    assert not main.with_name("old.py").exists()
+    assert "'wristband19'" in (tmp_path / "staging/start/main.py").read_text()
+
+
+def test_a_checkout_is_looked_at_before_anything_is_built(tmp_path):
+    with pytest.raises(BubbleskinError, match="not a MicroPython checkout"):
+        rp2040.firmware(["wristband7"], tmp_path)
+    for name in ("ports/rp2/CMakeLists.txt", "tools/mpy-tool.py"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("__attribute__ ((aligned (2)))")
+    with pytest.raises(BubbleskinError, match=r"aligned \(4\)"):
+        rp2040.firmware(["wristband7"], tmp_path)
+
+
+@pytest.mark.slow
+def test_the_same_inputs_give_the_same_bytes_in_another_folder(tmp_path):
+    try:
+        first = rp2040.firmware(["wristband7"])["wristband7"]
+    except BubbleskinError as problem:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(str(problem))
+    for name in ("source", "pico-sdk"):  # fetched once; everything else is made anew
+        shutil.copytree(rp2040.folder() / name, tmp_path / name, symlinks=True)
+    second = rp2040.firmware(["wristband7"], home=tmp_path)["wristband7"]
+    assert second.name == first.name  # the hash of the inputs
+    assert second.read_bytes() == first.read_bytes()

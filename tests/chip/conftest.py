@@ -1,0 +1,47 @@
+"""The chip's firmware, and boards that run it."""
+
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from bubbleskin.build.rp2040 import firmware
+from bubbleskin.errors import BubbleskinError
+
+pytest.importorskip("rp2040py")
+
+
+@pytest.fixture(scope="session")
+def uf2():
+    """`uf2(board)`: the path of today's firmware, built if need be. Skips where it cannot be built."""
+
+    def build(board: str):
+        try:
+            return firmware([board])[board]
+        except BubbleskinError as problem:
+            if os.environ.get("CI"):
+                pytest.fail(str(problem))
+            pytest.skip(str(problem))
+
+    return build
+
+
+@pytest.fixture
+def emulated(uf2) -> Iterator:
+    """`emulated(board, absent=…)`: a skin of a freshly booted emulated board."""
+    from bubbleskin.link.session import drive
+    from bubbleskin.sim.rp2040 import open_chip
+    from bubbleskin.sim.transport import SimulatedTransport
+    from bubbleskin.skin import AsyncSkin, Skin
+
+    skins = []
+
+    def open_(name: str, **options) -> Skin:
+        board = open_chip(name, uf2(name), **options)
+        transport = SimulatedTransport(board, f"rp2040://{name}")
+        skins.append(Skin(drive(AsyncSkin.open(transport, 2.0, simulated=board))))
+        return skins[-1]
+
+    yield open_
+    for skin in skins:
+        skin.close()

@@ -1,0 +1,129 @@
+"""Whole wristbands with the real firmware on the emulated chip: boot, shapes, and chips that fail."""
+
+import numpy as np
+import pytest
+
+import bubbleskin as bs
+
+pytestmark = pytest.mark.slow
+
+DOME = {"wristband7": 12.0 - 0.02 * np.sum(bs.Layout.hexagon(rings=1).positions_mm ** 2, axis=1)}
+DOME["wristband19"] = 12.0 - 0.015 * np.sum(bs.Layout.hexagon(rings=2).positions_mm ** 2, axis=1)
+
+
+@pytest.mark.parametrize("name", list(DOME))
+def test_a_dome_settles_through_the_chips(emulated, name):
+    skin = emulated(name)
+    board = skin.simulated
+    assert skin.info.board == name
+    assert board.time < 0.5  # HELLO has been answered
+    assert board.chip.resets == 0
+    skin.show(DOME[name])
+    assert np.abs(board.height_mm - DOME[name]).max() < 0.2
+    skin.sleep(0.3)
+    assert np.abs(board.height_mm - DOME[name]).max() < 0.2
+    health = skin.health()
+    assert health.exceptions == 0
+    skin.vent()
+    skin.sleep(0.02)
+    assert (board.pulses == [0.0, board.tick_s]).all()
+
+
+def test_two_runs_are_the_same_to_the_bit(emulated):
+    def run():
+        skin = emulated("wristband7")
+        skin.show(DOME["wristband7"], wait=False)
+        skin.sleep(0.05)
+        return skin.simulated.time, skin.simulated.height_mm.tobytes(), bytes(skin.simulated.chip.mcu.sram)
+
+    assert run() == run()
+
+
+def vented(board) -> bool:
+    return bool((board.pulses == [0.0, board.tick_s]).all())
+
+
+@pytest.mark.parametrize("name", ["wristband7", "wristband19"])
+def test_a_converter_that_falls_silent_vents_its_bubbles_and_is_named(emulated, name):
+    skin = emulated(name)
+    board = skin.simulated
+    skin.show(DOME[name], wait=False)
+    skin.sleep(0.1)
+    assert not vented(board)
+    board.inject("converter_silent", 0)
+    skin.sleep(5 * board.tick_s)
+    on_it = board.data.CONVERTERS[0][1]
+    assert (board.pulses[:on_it] == [0.0, board.tick_s]).all()
+    assert "sensor_chip" in skin.health().board_faults
+    assert set(skin.faults()) == set(range(on_it))
+    others = slice(on_it, None)  # go on
+    assert not (board.pulses[others] == [0.0, board.tick_s]).all() or on_it == len(board.pulses)
+
+
+def test_a_valve_driver_that_falls_silent_is_cut_off_by_output_enable(emulated):
+    skin = emulated("wristband19")
+    board = skin.simulated
+    skin.show(DOME["wristband19"], wait=False)
+    skin.sleep(0.1)
+    board.inject("driver_silent", 1)
+    skin.sleep(3 * board.tick_s)
+    assert vented(board)
+    assert "valve_chip" in skin.health().board_faults
+
+
+def test_the_emergency_stop_vents_within_a_tick(emulated):
+    skin = emulated("wristband7")
+    board = skin.simulated
+    skin.show(DOME["wristband7"], wait=False)
+    skin.sleep(0.1)
+    board.inject("estop")
+    skin.sleep(2 * board.tick_s)  # the ticks of the chip are not in step with ours
+    assert vented(board)
+    assert "emergency_stop" in skin.health().board_faults
+    with pytest.raises(bs.DeviceRefused):
+        skin.show(DOME["wristband7"])
+    board.inject("estop", value=0)
+    skin.clear_faults()
+    skin.show(DOME["wristband7"], wait=False)
+    skin.sleep(3 * board.tick_s)
+    assert not vented(board)
+
+
+def test_a_converter_that_is_missing_is_named_after_boot(emulated):
+    skin = emulated("wristband7", absent=("converter0",))
+    skin.sleep(0.05)
+    assert vented(skin.simulated)
+    assert "sensor_chip" in skin.health().board_faults
+
+
+def test_the_self_test_at_boot_finds_a_stuck_valve_and_no_other(emulated):
+    skin = emulated("wristband7")
+    skin.simulated.inject("fill_stuck", 3, -1)
+    for _ in range(40):
+        skin.sleep(0.1)
+        health = skin.health()
+        if health.self_test not in ("running", "not_run"):
+            break
+    assert health.self_test == "failed"
+    assert health.unfilled == (3,)
+    assert health.untrue_zero == ()
+
+
+def test_a_program_that_hangs_is_ended_by_the_watchdog_and_says_so_afterwards(emulated):
+    skin = emulated("wristband7")
+    board = skin.simulated
+    skin.show(DOME["wristband7"], wait=False)
+    skin.sleep(0.1)
+    assert not vented(board)
+    board.inject("hang")
+    hung = board.time
+    while not vented(board):
+        board.tick()
+        assert board.time < hung + 0.1
+    assert board.chip.resets == 1
+    while not board.chip.connected:
+        board.tick()
+    skin.sleep(0.3)
+    health = skin.health()
+    assert "watchdog" in health.board_faults
+    assert health.mode == "vented"
