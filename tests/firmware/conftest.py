@@ -15,6 +15,23 @@ class Hands:
 
     boot_id = 0xFEDCBA98
     late_ticks = 0
+    alarms = boot_faults = 0
+    self_test = False
+
+    def alive(self, mode, faults):
+        pass
+
+    def clear(self):
+        pass
+
+    def slack(self):
+        pass
+
+    def tidy(self):
+        pass
+
+    def restart(self, into):
+        pass
 
     def __init__(self, board):
         self.counts = [board.SENSOR_ZERO] * board.BUBBLES + [

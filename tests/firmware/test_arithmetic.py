@@ -36,7 +36,9 @@ def test_rows_do_not_overlap():
     places = [getattr(control, name) for name in row]
     assert places == list(range(len(row)))
     record = max(control.SEGMENT, control.MODEL, control.CONTENT, control.SLOPE, control.WEIGHED)
-    assert record + 1 == control.SETPOINT - control.HEIGHT == control.ROW - control.SETPOINT
+    assert record + 1 == control.SETPOINT - control.HEIGHT
+    rest = names[names.index("LOWEST") : names.index("ROW")]
+    assert [getattr(control, name) for name in rest] == list(range(control.SETPOINT + record + 1, control.ROW))
     board = names[names.index("N") : names.index("BOARD")]
     assert [getattr(control, name) for name in board] == list(range(control.BOARD))
 
@@ -105,7 +107,7 @@ class Weighed:
         row = self.bubbles._rows
         row[control.HEIGHT] = height_um << 4
         row[control.HEIGHT + control.WEIGHED] = -1
-        self.bubbles.decide(messages.HOLDING)
+        self.bubbles.decide()
         return [row[control.HEIGHT + place] for place in (control.MODEL, control.CONTENT, control.SLOPE)]
 
 
@@ -163,6 +165,9 @@ class Words:
         self._view = view
 
     def __getitem__(self, index):
+        if isinstance(index, slice):  # a pointer further on
+            assert index.start >= 0
+            return Words(self._view[index])
         assert index >= 0
         return Word(self._view[index])
 

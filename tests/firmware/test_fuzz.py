@@ -21,6 +21,8 @@ class Hands:
     # The link is `line[:length]`, 256 bytes of it in every tick.
     boot_id = 1
     late_ticks = 0
+    alarms = boot_faults = 0
+    self_test = False
 
     def __init__(self):
         self.line = bytearray(8192)
@@ -54,6 +56,18 @@ class Hands:
         if frame[1] != TELEMETRY:
             self.answers += 1
         return True
+
+    def alive(self, mode, faults):
+        pass
+
+    def tidy(self):
+        pass
+
+    def slack(self):
+        pass
+
+    def clear(self):
+        pass
 
     def phase_us(self):
         return 0

@@ -14,6 +14,8 @@ class Hands:
     # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick.
     boot_id = 1
     late_ticks = 0
+    alarms = boot_faults = 0
+    self_test = False
 
     def __init__(self, board, requests):
         self.n = board.BUBBLES
@@ -74,6 +76,18 @@ class Hands:
     def send(self, frame, length):
         self.sent += 1
         return self.sent & 15 != 0
+
+    def alive(self, mode, faults):
+        pass
+
+    def tidy(self):
+        pass
+
+    def slack(self):
+        pass
+
+    def clear(self):
+        pass
 
     def phase_us(self):
         return 100

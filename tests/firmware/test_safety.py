@@ -276,8 +276,8 @@ def test_a_reservoir_above_its_limit_is_dumped(rig7):
     board = rig7.board
     rig7.hands.counts[-1] = board.SUPPLY_ZERO + (board.SUPPLY_MAX_PA + 1000) // board.SUPPLY_PA_PER_COUNT
     rig7.tick(30)
-    assert rig7.hands.dump is True
+    assert rig7.hands.dump
     assert rig7.hands.pump == 0
     rig7.hands.counts[-1] = board.SUPPLY_ZERO + board.SUPPLY_PA // board.SUPPLY_PA_PER_COUNT
     rig7.tick(30)
-    assert rig7.hands.dump is False
+    assert not rig7.hands.dump
