@@ -18,6 +18,7 @@ _TRANSLATED = {"mode", "board_faults", "self_test", "untrue_zero", "unfilled", "
 def _bits(mask: int) -> tuple[int, ...]:
     return tuple(bit for bit in range(32) if mask >> bit & 1)
 
+
 _NO_PRESSURE_KPA = 1.0
 """What an empty bubble may still have, or a sensor be off by: 0.03 mm."""
 _AT_REST_MM = 0.2
@@ -101,7 +102,7 @@ class Health:
             supply_kpa=reply["supply_pa"] / 1000,
             mode=_MODES.get(reply["mode"], "unknown"),
             board_faults=tuple(name for bit, name, _ in messages.BOARD_FAULTS if reply["board_faults"] & bit),
-            self_test=_SELF_TESTS[reply["self_test"]],
+            self_test=_SELF_TESTS.get(reply["self_test"], "unknown"),
             untrue_zero=_bits(reply["untrue_zero"]),
             unfilled=_bits(reply["unfilled"]),
             unvented=_bits(reply["unvented"]),

@@ -64,7 +64,11 @@ def test_everything_imports_in_the_real_micropython(micropython):
         ".".join(path.relative_to(folder.parent).with_suffix("").parts)
         for folder in FOLDERS
         for path in sorted(folder.rglob("*.py"))
-        if not any(f"{word} {name}" in path.read_text(encoding="utf-8") for word in ("import", "from") for name in ("machine", "rp2"))
+        if not any(
+            f"{word} {name}" in path.read_text(encoding="utf-8")
+            for word in ("import", "from")
+            for name in ("machine", "rp2")
+        )
     ]
     modules = [module.removesuffix(".__init__") for module in modules]
     said = micropython(

@@ -24,7 +24,7 @@ from bubbleskin.skin import AsyncSkin
 
 pytestmark = pytest.mark.timeout(30)
 
-TIMEOUT = 0.4
+TIMEOUT = 1.0
 
 
 def fails(kind, *words, act, within=TIMEOUT + 2):

@@ -74,7 +74,8 @@ def test_info_health_and_state_are_in_the_units_of_their_names():
     assert info.same_schema
     assert (info.tick, info.height_rest_mm, info.height_max_mm, info.pressure_max_kpa) == (0.005, 5.0, 14.0, 42.0)
     counters = (400, 3, 1000, 1, 17, 2, 5, 123456, 59990, 0xDEADBEEF, messages.HOLDING)
-    (reply,) = receive(wire.encode("INFO_REPLY", 1, counters))
+    board = (messages.WATCHDOG, messages.FAILED, 0b101, 0b10, 0)
+    (reply,) = receive(wire.encode("INFO_REPLY", 1, (*counters, *board)))
     assert Health.of(reply, info.tick) == Health(
         time=2.0,
         late_ticks=3,
@@ -87,6 +88,11 @@ def test_info_health_and_state_are_in_the_units_of_their_names():
         supply_kpa=59.99,
         tables_crc=0xDEADBEEF,
         mode="holding",
+        board_faults=("watchdog",),
+        self_test="failed",
+        untrue_zero=(0, 2),
+        unfilled=(1,),
+        unvented=(),
     )
     (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 1), [(12345, -34, 12000, 2, 0), (5000, 0, 0, 4, 5)]))
     state = State.of(reply, info.tick)
@@ -110,8 +116,8 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
     state = State.of(reply, 0.005)
     assert (state.mode, state.status, state.faults) == ("unknown", ("unknown",), ((),))
     assert not state.settled
-    (reply,) = receive(wire.encode("INFO_REPLY", 1, (*[0] * 10, 99)))
-    assert Health.of(reply, 0.005).mode == "unknown"
+    (reply,) = receive(wire.encode("INFO_REPLY", 1, (*[0] * 10, 99, 0, 99, 0, 0, 0)))
+    assert (Health.of(reply, 0.005).mode, Health.of(reply, 0.005).self_test) == ("unknown", "unknown")
 
 
 @pytest.mark.parametrize(
@@ -158,6 +164,11 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
             error(messages.FAULTED),
             "The wristband failed at SHOW and vents. `bubbleskin info` counts its exceptions.",
         ),
+        (
+            error(messages.BOARD_FAULT, asked=messages.ESTOP),
+            "The wristband refused SHOW: the emergency stop is pressed, or its loop is broken: everything vents. "
+            "Mend the cause, then `clear_faults()`.",
+        ),
         (error(200), "The wristband refused SHOW with error 200."),
     ],
 )
@@ -168,6 +179,7 @@ def test_every_refusal_has_its_sentence(received, sentence):
 def test_every_error_of_the_schema_is_explained():
     explained = {messages.UNKNOWN_MESSAGE, messages.WRONG_LENGTH, messages.OUT_OF_RANGE, messages.WRONG_COUNT}
     explained |= {messages.BAD_TABLE, messages.BAD_CRC, messages.NO_COMMON_PROTOCOL, messages.FAULTED}
+    explained |= {messages.BOARD_FAULT}
     assert explained == {code for code, _, _ in messages.ERRORS}
 
 
