@@ -87,26 +87,17 @@ class Bubbles:
 
     def hold(self):
         """Where the bubbles are is where they are wanted."""
-        row = self._rows
-        for i in range(self.count):
-            at = i * control.ROW
-            row[at + control.START] = row[at + control.TARGET] = row[at + control.HEIGHT] >> 4
+        control.hold(self._rows, self.count)
         self._ramp(1)
 
     def rest(self):
         """No bubble is wanted higher than it is without pressure."""
-        row = self._rows
-        for at in range(0, self.count * control.ROW, control.ROW):
-            row[at + control.START] = row[at + control.TARGET] = self._board[control.REST_UM]
+        control.rest(self._rows, self._board[control.REST_UM], self.count)
         self._ramp(1)
 
     def clear_faults(self):
         """Forget all faults; what still is wrong faults again."""
-        row = self._rows
-        for at in range(0, self.count * control.ROW, control.ROW):
-            row[at + control.FAULTS] = row[at + control.OVER] = row[at + control.LOST] = row[
-                at + control.FILL_RUN_US
-            ] = 0
+        control.forget(self._rows, self.count)
 
     def pressure_pa(self, bubble):
         """Gauge pressure of one bubble."""
