@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 GENERATORS := nominal_table golden_vectors protocol_page cli_page draw_demo draw_membrane_figures
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check lint generated micropython bench generate clean
+.PHONY: help setup demo test chip check lint generated micropython bench generate clean
 
 help: ## what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -26,10 +26,14 @@ demo: setup ## a simulated wristband takes two shapes; ends with a picture
 	$(BIN)/bubbleskin demo
 
 test: setup lint generated micropython ## every check that needs no hardware
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 -m "not chip"
+
+chip: setup micropython ## build the RP2040's firmware and run it on an emulated chip, ten minutes
+	$(BIN)/bubbleskin firmware build
+	$(BIN)/python -m pytest -n 2 -m chip
 
 check: setup lint ## the everyday checks, under a minute
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+	$(BIN)/python -m pytest -n 2 -m "not slow and not chip"
 
 lint: setup
 	$(BIN)/ruff check

@@ -87,18 +87,12 @@ class Bubbles:
 
     def hold(self):
         """Where the bubbles are is where they are wanted."""
-        row = self._rows
-        for i in range(self.count):
-            at = i * control.ROW
-            row[at + control.START] = row[at + control.TARGET] = row[at + control.HEIGHT] >> 4
+        control.hold(self._rows, self.count)
         self._ramp(1)
 
     def rest(self):
         """No bubble is wanted higher than it is without pressure."""
-        row = self._rows
-        for i in range(self.count):
-            at = i * control.ROW  # a range with a step would be an allocation, and this is called when memory is out
-            row[at + control.START] = row[at + control.TARGET] = self._board[control.REST_UM]
+        control.rest(self._rows, self._board[control.REST_UM], self.count)
         self._ramp(1)
 
     def clear_faults(self):
@@ -106,8 +100,7 @@ class Bubbles:
 
         What leads to a fault goes on counting: a host that clears all the time does not disarm the guard.
         """
-        for i in range(self.count):
-            self._rows[i * control.ROW + control.FAULTS] = 0
+        control.forget(self._rows, self.count)
 
     def pressure_pa(self, bubble):
         """Gauge pressure of one bubble."""

@@ -410,6 +410,35 @@ def aim(s: ptr32, v: ptr32, at: int, n: int):
 
 
 @micropython.viper
+def hold(s: ptr32, n: int):
+    """Want every bubble where it is."""
+    while n > 0:
+        s[START] = s[HEIGHT] >> 4
+        s[TARGET] = s[START]
+        s = ptr32(uint(s) + 4 * ROW)
+        n -= 1
+
+
+@micropython.viper
+def rest(s: ptr32, height: int, n: int):
+    """Want every bubble at `height` µm, at once."""
+    while n > 0:
+        s[START] = height
+        s[TARGET] = height
+        s = ptr32(uint(s) + 4 * ROW)
+        n -= 1
+
+
+@micropython.viper
+def forget(s: ptr32, n: int):
+    """Forget all faults, but not what is about to become one."""
+    while n > 0:
+        s[FAULTS] = 0
+        s = ptr32(uint(s) + 4 * ROW)
+        n -= 1
+
+
+@micropython.viper
 def first_above(v: ptr32, at: int, end: int, limit: int) -> int:
     """The index of the first of `values[at:end]` above `limit`, -1 where there is none."""
     while at < end:

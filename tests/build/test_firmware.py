@@ -51,7 +51,7 @@ def test_a_checkout_is_looked_at_before_anything_is_built(tmp_path):
         rp2040.firmware(["wristband7"], tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.chip
 def test_the_same_inputs_give_the_same_bytes_in_another_folder(tmp_path):
     try:
         first = rp2040.firmware(["wristband7"])["wristband7"]

@@ -16,7 +16,7 @@ from bubbleskin.sim.board import InProcessFirmware, SimulatedBoard
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.chip
 
 REPLAY = """
 import binascii

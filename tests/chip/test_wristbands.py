@@ -5,7 +5,7 @@ import pytest
 
 import bubbleskin as bs
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.chip
 
 DOME = {"wristband7": 12.0 - 0.02 * np.sum(bs.Layout.hexagon(rings=1).positions_mm ** 2, axis=1)}
 DOME["wristband19"] = 12.0 - 0.015 * np.sum(bs.Layout.hexagon(rings=2).positions_mm ** 2, axis=1)

@@ -211,21 +211,32 @@ def test_widths_come_out_of_the_expander(expander, width):
     chip, _, driver = expander
     pulses = array("H", [7] * 38)
     pulses[14], pulses[15] = width, width  # bubble 7 is this chip's first
-    driver.write(pulses)
+    driver.write(pulses, False)
     counts = round(width * 4096 / 10000)
     assert chip.high(0) == set(range(counts)), "fill: energised from the start"
     assert chip.high(1) == set(range(counts, 4096)), "vent: left open from the start, energised after"
     assert chip.high(11) == set(range(3, 4096))
 
 
+def test_what_has_not_changed_is_only_sent_again_when_asked(expander):
+    chip, _, driver = expander
+    pulses = array("H", [1500] * 38)
+    driver.write(pulses, False)
+    chip.registers[6:70] = bytes(64)
+    driver.write(pulses, False)
+    assert not any(chip.registers[6:70])
+    driver.write(pulses, True)
+    assert any(chip.registers[6:70])
+
+
 def test_an_expander_that_does_not_answer_is_left_alone_until_started(expander):
     chip, bus, driver = expander
     pulses = array("H", bytes(76))
     del bus.chips[0x41]
-    driver.write(pulses)
+    driver.write(pulses, False)
     assert driver.missing
     bus.chips[0x41] = chip
-    driver.write(pulses)
+    driver.write(pulses, False)
     driver.check()
     assert driver.missing
     driver.start()

@@ -223,7 +223,7 @@ class ExpanderValves:
         clock.stop()
         for chip in self._chips:
             chip.start()
-            chip.write(self._safe)
+            chip.write(self._safe, True)
             chip.wake()
         self.stopped = True
         self.silent = False
@@ -237,11 +237,15 @@ class ExpanderValves:
         """Set the next period; says whether the valves do as they are told."""
         pwm.write(_PWM, pulses, 0, pump)
         chips = self._chips
-        self._turn = self._turn + 1 if self._turn + 1 < len(chips) else 0
-        chips[self._turn].check()
+        turn = self._turn + 1
+        if turn == len(chips):
+            turn = 0
+        self._turn = turn
+        chips[turn].check()
         silent = False
-        for chip in chips:
-            chip.write(pulses)
+        for index in range(len(chips)):
+            chip = chips[index]
+            chip.write(pulses, index == turn)
             if chip.missing:
                 silent = True
         self.silent = silent
@@ -251,7 +255,7 @@ class ExpanderValves:
         """Fill closed, vent open in the next period; `DISABLE` has done it already. Pump off."""
         pwm.vent(_PWM, 0, 0)
         for chip in self._chips:
-            chip.write(self._safe)
+            chip.write(self._safe, False)
 
     def clear(self):
         """Ask chips that were silent again."""

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """PCA9685: sixteen 12-bit PWM outputs on I2C (NXP PCA9685 rev. 4, section 7.3), here for pairs of valves.
 
 One period is 4096 counts of EXTCLK / (PRE_SCALE + 1). The RP2040 makes EXTCLK from its own clock, so a period
@@ -25,11 +26,13 @@ _FULL = const(16)  # bit 12, in the high byte
 
 
 @micropython.viper
-def encode(pulses, first: int, bubbles: int, tick_us: int, scale: int, frame):
-    """Put the outputs of `bubbles` bubbles from number `first` on into `frame[1:]`; `scale` is counts per µs, << 16."""
-    pulse = ptr16(pulses)
-    out = ptr8(frame)
+def encode(out: ptr8, pulse: ptr16, first: int, bubbles: int, tick_us: int, scale: int) -> int:
+    """Put the outputs of `bubbles` bubbles from number `first` on into `out[1:]`; returns whether any has changed.
+
+    `scale` is counts per µs, << 16.
+    """
     at = 1
+    changed = 0
     valve = 2 * first
     stop = valve + 2 * bubbles
     vent = 0
@@ -46,13 +49,16 @@ def encode(pulses, first: int, bubbles: int, tick_us: int, scale: int, frame):
         elif vent:
             on = off
             off = 0
-        out[at] = on & 255
-        out[at + 1] = on >> 8
-        out[at + 2] = off & 255
-        out[at + 3] = off >> 8
+        if out[at] | out[at + 1] << 8 != on or out[at + 2] | out[at + 3] << 8 != off:
+            changed = 1
+            out[at] = on & 255
+            out[at + 1] = on >> 8
+            out[at + 2] = off & 255
+            out[at + 3] = off >> 8
         at += 4
         valve += 1
         vent = 1 - vent
+    return changed
 
 
 class Pca9685:
@@ -86,10 +92,10 @@ class Pca9685:
         """Count: outputs follow what has been written."""
         self._command(b"\x00\x60")  # MODE1: EXTCLK, auto-increment, awake
 
-    def write(self, pulses):
-        """Set the next period."""
-        encode(pulses, self._first, self._bubbles, self._tick_us, self._scale, self._frame)
-        self._command(self._frame)
+    def write(self, pulses, again):
+        """Set the next period; what has not changed is only sent `again` where that is wanted."""
+        if encode(self._frame, pulses, self._first, self._bubbles, self._tick_us, self._scale) or again:
+            self._command(self._frame)
 
     def check(self):
         """See that the chip is there and awake: one that has lost its power sleeps."""
