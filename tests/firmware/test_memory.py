@@ -86,6 +86,9 @@ class Hands:
     def slack(self):
         pass
 
+    def restart(self, into):
+        pass
+
     def clear(self):
         pass
 
