@@ -204,8 +204,12 @@ def weigh(s: ptr32, k: ptr32, knot: ptr16):
         if moving:
             reach = s[TARGET] - s[START]
             s[SETPOINT] = (s[START] + reach * k[RAMP_DONE] // k[RAMP_TICKS]) << 4
-        w = ptr32(uint(s) + 4 * HEIGHT)
-        exact = 0
+        w = s
+        exact = 2  # nothing to do
+        off = s[HEIGHT] - s[HEIGHT + WEIGHED]
+        if off > NEAR or off < 0 - NEAR or s[SETPOINT] != s[SETPOINT + WEIGHED]:
+            w = ptr32(uint(s) + 4 * HEIGHT)
+            exact = 0
         while exact < 2:
             off = w[0] - w[WEIGHED]
             if off > NEAR or off < 0 - NEAR or (exact and off != 0):

@@ -53,20 +53,20 @@ except ImportError:
         return memoryview(buffer).cast("B").cast("H")
 
     def ptr32(buffer):
-        """An `array('i')`, or what `uint` made of one, as signed 32-bit words."""
-        if isinstance(buffer, _Address):
-            return buffer.words[buffer.at >> 2 :]
-        return memoryview(buffer) if isinstance(buffer, array) else buffer
+        """An `array('i')`, or a pointer further on in one, as signed 32-bit words."""
+        return buffer
 
     class _Address:
-        """A pointer as a number, good for adding bytes to."""
+        """A pointer as a number, good for adding bytes to: that is the pointer further on."""
 
-        def __init__(self, words, at=0):
+        __slots__ = ("words",)
+
+        def __init__(self, words):
             self.words = words
-            self.at = at
 
         def __add__(self, size):
-            return _Address(self.words, self.at + size)
+            words = self.words
+            return (memoryview(words) if isinstance(words, array) else words)[size >> 2 :]
 
     def uint(pointer):
         """The address in a pointer."""
