@@ -49,6 +49,7 @@ def unsent(skin):
     assert state.target_mm == pytest.approx(6.0)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("unsent")
 @pytest.mark.parametrize("wrong", WRONG_HEIGHTS)
 def test_heights(skin, wrong):
@@ -59,6 +60,7 @@ def test_heights(skin, wrong):
     assert isinstance(caught.value, ValueError)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("unsent")
 @pytest.mark.parametrize("over", [-0.1, 60.1, math.inf, math.nan])
 def test_over(skin, over):
@@ -66,6 +68,7 @@ def test_over(skin, over):
         skin.show(np.full(skin.info.bubbles, 7.0), over=over)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("unsent")
 @pytest.mark.parametrize("rate_hz", [0, -1, math.nan, 1e4])
 def test_telemetry_rate(skin, rate_hz):
@@ -88,6 +91,7 @@ def test_the_limits_themselves_are_allowed(skin):
     skin.show(np.zeros(n), wait=False)
 
 
+@pytest.mark.long
 def test_the_highest_shape_holds(skin):
     """The board's own limit must not trip over the overshoot of its highest heights."""
     n = skin.info.bubbles

@@ -56,6 +56,7 @@ def test_health_of_a_board_at_rest(skin):
     assert skin.faults() == {}
 
 
+@pytest.mark.long
 def test_states_follow_each_other(skin):
     states = [skin.state() for _ in range(100)]
     assert all(0 < later.time - sooner.time < 0.2 for sooner, later in pairwise(states))
@@ -66,7 +67,7 @@ def test_states_follow_each_other(skin):
         assert set(state.status) == {"resting"}
 
 
-@pytest.mark.parametrize("rate_hz", [5, 20, 100])
+@pytest.mark.parametrize("rate_hz", [pytest.param(5, marks=pytest.mark.long), 20, 100])
 def test_telemetry_keeps_its_rate_by_the_devices_clock(skin, rate_hz):
     dropped = skin.health().telemetry_dropped
     times = [state.time for state in islice(skin.telemetry(rate_hz), 20)]
@@ -74,6 +75,7 @@ def test_telemetry_keeps_its_rate_by_the_devices_clock(skin, rate_hz):
     assert skin.health().telemetry_dropped == dropped
 
 
+@pytest.mark.long
 def test_telemetry_and_requests_share_the_link(skin):
     times, asked = [], []
     for number, state in enumerate(skin.telemetry(50)):
@@ -91,6 +93,7 @@ def test_telemetry_and_requests_share_the_link(skin):
     assert state.height_mm == pytest.approx(10, abs=0.3)
 
 
+@pytest.mark.long
 def test_a_second_connection_finds_the_same_device(target, skin):
     first = skin.info
     skin.show(np.full(first.bubbles, 6.0))
@@ -113,6 +116,7 @@ def test_tables_come_back_as_they_were_sent(skin, kept_tables):
     assert skin.health().tables_crc == crc(sent) != crc(kept_tables)
 
 
+@pytest.mark.long
 def test_uploaded_tables_are_used(skin, kept_tables):
     table = softer(0.93)
     skin.upload_tables(table)

@@ -31,6 +31,7 @@ def check_step(skin, watch, start, target):
     return seen.height_mm[-1]
 
 
+@pytest.mark.long
 def test_extremes_in_a_row(skin, watch):
     n = skin.info.bubbles
     other = np.where(np.arange(n) % 2, LOW, HIGH)
@@ -39,6 +40,7 @@ def test_extremes_in_a_row(skin, watch):
         heights = check_step(skin, watch, heights, target)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_random_heights_in_a_row(skin, watch, seed):
     rng = np.random.default_rng(seed)
@@ -47,6 +49,7 @@ def test_random_heights_in_a_row(skin, watch, seed):
         heights = check_step(skin, watch, heights, random_heights(rng, skin.info.bubbles))
 
 
+@pytest.mark.long
 def test_show_returns_when_all_is_settled(skin):
     rng = np.random.default_rng(3)
     for _ in range(5):
@@ -60,6 +63,7 @@ def test_show_returns_when_all_is_settled(skin):
         assert state.height_mm == pytest.approx(target, abs=NEAR)
 
 
+@pytest.mark.long
 def test_a_new_show_takes_over_at_once(skin, watch):
     """Shows that do not wait for each other: only the last one counts."""
     n = skin.info.bubbles
@@ -69,6 +73,7 @@ def test_a_new_show_takes_over_at_once(skin, watch):
     assert watch(2.0).since(SOON).height_mm == pytest.approx(10.0, abs=NEAR)
 
 
+@pytest.mark.long
 def test_heights_up_to_rest_take_no_pressure(skin):
     n = skin.info.bubbles
     skin.show(np.full(n, 11.0))
@@ -81,6 +86,7 @@ def test_heights_up_to_rest_take_no_pressure(skin):
     assert skin.state().pressure_kpa == pytest.approx(0, abs=0.4)
 
 
+@pytest.mark.long
 def test_each_bubble_goes_its_own_way(skin):
     """The order of bubbles is the layout's on the whole way to the membranes and back."""
     n = skin.info.bubbles
@@ -95,6 +101,7 @@ def test_each_bubble_goes_its_own_way(skin):
         assert np.argmax(state.pressure_kpa) == bubble
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("over", [1.0, 3.0])
 @pytest.mark.parametrize(("low", "high"), [(5.5, 6.9), (9.2, 12.5)])
 def test_a_ramp_takes_its_time(skin, watch, over, low, high):
@@ -112,6 +119,7 @@ def test_a_ramp_takes_its_time(skin, watch, over, low, high):
         assert np.abs(seen.since(over + SOON).height_mm - end).max() <= NEAR
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("start", [0.0, 9.5, 12.5])
 def test_a_ramp_is_waited_for(skin, start):
     n = skin.info.bubbles
@@ -123,6 +131,7 @@ def test_a_ramp_is_waited_for(skin, start):
     assert state.height_mm == pytest.approx(12.0, abs=NEAR)
 
 
+@pytest.mark.long
 def test_a_ramp_to_rest_is_waited_for(skin):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.0))
@@ -130,3 +139,13 @@ def test_a_ramp_to_rest_is_waited_for(skin):
     state = skin.show(np.zeros(n), over=2.0)
     assert 0.5 <= state.time - before <= 3.5
     assert state.height_mm == pytest.approx(skin.info.height_rest_mm, abs=NEAR)
+
+
+def test_a_dome_settles_and_stays(skin, watch):
+    """The shortest whole way from heights to membranes and back; it runs on emulated chips too."""
+    distance = np.linalg.norm(skin.layout.positions_mm, axis=1) / skin.layout.pitch_mm
+    dome = 12.0 - 1.5 * distance**2 / max(distance.max(), 1.0)
+    state = skin.show(dome)
+    assert state.settled
+    assert state.height_mm == pytest.approx(dome, abs=NEAR)
+    assert watch(0.3).height_mm[-1] == pytest.approx(dome, abs=NEAR)

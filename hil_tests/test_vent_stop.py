@@ -8,6 +8,7 @@ pytestmark = pytest.mark.timeout(60)
 NO_PRESSURE_KPA = 0.4  # sensor noise is 50 Pa
 
 
+@pytest.mark.long
 def test_vent_empties_every_bubble_within_a_second(skin):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.5))
@@ -24,7 +25,9 @@ def test_vent_empties_every_bubble_within_a_second(skin):
         skin.sleep(0.25)
 
 
-@pytest.mark.parametrize("after", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize(
+    "after", [pytest.param(0.0, marks=pytest.mark.long), 0.02, pytest.param(0.1, marks=pytest.mark.long)]
+)
 def test_vent_ends_a_show_that_is_under_way(skin, after):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.0), wait=False)
@@ -36,6 +39,7 @@ def test_vent_ends_a_show_that_is_under_way(skin, after):
     assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
 
 
+@pytest.mark.long
 def test_vent_ends_a_ramp(skin):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.0), over=5.0, wait=False)
@@ -47,6 +51,7 @@ def test_vent_ends_a_ramp(skin):
     assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
 
 
+@pytest.mark.long
 def test_stop_keeps_the_air(skin, watch):
     n = skin.info.bubbles
     shape = np.linspace(9.0, 12.5, n)
@@ -62,6 +67,7 @@ def test_stop_keeps_the_air(skin, watch):
     assert set(state.status) == {"stopped"}
 
 
+@pytest.mark.long
 def test_stop_in_the_middle_of_a_move(skin, watch):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.5), over=2.0, wait=False)
@@ -77,6 +83,7 @@ def test_stop_in_the_middle_of_a_move(skin, watch):
     assert state.target_mm == pytest.approx(state.height_mm, abs=0.2), "where they are is where they are wanted"
 
 
+@pytest.mark.long
 def test_stop_while_vented_keeps_what_is_there(skin, watch):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.5))
@@ -88,6 +95,7 @@ def test_stop_while_vented_keeps_what_is_there(skin, watch):
     assert (held.height_mm > skin.info.height_rest_mm + 0.5).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("interruption", ["stop", "vent"])
 def test_a_show_goes_on_afterwards(skin, watch, interruption):
     n = skin.info.bubbles
