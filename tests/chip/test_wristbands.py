@@ -96,6 +96,16 @@ def test_a_converter_that_is_missing_is_named_after_boot(emulated):
     assert "sensor_chip" in skin.health().board_faults
 
 
+def test_a_valve_driver_that_is_missing_is_named_after_boot_and_the_others_stay_safe(emulated):
+    skin = emulated("wristband19", absent=("driver2",))
+    skin.sleep(0.05)
+    assert vented(skin.simulated)
+    assert "valve_chip" in skin.health().board_faults
+    with pytest.raises(bs.DeviceRefused, match="valve driver"):
+        skin.show(DOME["wristband19"])
+    assert vented(skin.simulated)
+
+
 def test_the_self_test_at_boot_finds_a_stuck_valve_and_no_other(emulated):
     skin = emulated("wristband7")
     skin.simulated.inject("fill_stuck", 3, -1)

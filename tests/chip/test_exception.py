@@ -1,0 +1,74 @@
+"""An exception inside the tick, on the chip: the real drivers, with one that raises while a free pin is high.
+
+The firmware has no switch for this. The prompt of the BARE firmware starts the frozen application by hand, with
+`hands.sense` wrapped, as a driver that fails would look.
+"""
+
+import numpy as np
+import pytest
+
+from bubbleskin.build.rp2040 import BARE
+from bubbleskin.link.session import drive
+from bubbleskin.sim.rp2040.board import Rp2040Board
+from bubbleskin.sim.rp2040.prompt import Prompt
+from bubbleskin.sim.transport import SimulatedTransport
+from bubbleskin.skin import AsyncSkin, Skin
+
+pytestmark = pytest.mark.chip
+
+SPARE_PIN = 22
+
+START = """
+from machine import Pin
+from bubble_firmware import boards
+from bubble_firmware.app import App, run
+from bubble_firmware.boards.pico import Hands
+board = boards.load("wristband7")
+hands = Hands(board)
+spare = Pin({pin}, Pin.IN)
+sense = hands.sense
+def failing(counts):
+    if spare():
+        raise OSError(5)
+    sense(counts)
+hands.sense = failing
+app = App(board, hands)
+run(app)
+"""
+
+
+@pytest.fixture
+def skin(uf2):
+    board = Rp2040Board("wristband7", uf2(BARE))
+    Prompt(board.chip)
+    board.chip.from_device.clear()
+    board.chip.write(START.format(pin=SPARE_PIN).encode() + b"\x04")
+    while len(board.from_device) < 2 and board.time < 5.0:
+        board.chip.run(1e-3)
+    assert board.from_device.startswith(b"OK"), bytes(board.from_device)
+    board.from_device.clear()
+    with Skin(drive(AsyncSkin.open(SimulatedTransport(board, "rp2040://wristband7"), 2.0, simulated=board))) as skin:
+        yield skin
+
+
+def test_an_exception_in_the_tick_vents_within_one_and_is_named(skin):
+    board = skin.simulated
+    skin.show(np.full(7, 11.0), wait=False)
+    skin.sleep(0.1)
+    safe = [0.0, board.tick_s]
+    assert not (board.pulses == safe).all()
+    fail = board.chip.mcu.gpio[SPARE_PIN].set_input_value
+    fail(True)
+    failed = board.time
+    while not (board.pulses == safe).all():
+        board.chip.run(1e-4)
+        assert board.time - failed <= 2 * board.tick_s  # the tick that is under way may have read the pin already
+    fail(False)
+    health = skin.health()
+    assert health.exceptions >= 1
+    assert "exception" in health.board_faults
+    assert set(skin.state().status) == {"resting"}
+    skin.clear_faults()
+    skin.show(np.full(7, 9.5), wait=False)  # the rest answers, and works again
+    skin.sleep(0.05)
+    assert skin.state().mode == "active"
