@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from bubble_firmware import boards
 from bubble_firmware.app import App
 from bubbleskin.errors import InvalidInput
+from bubbleskin.layout import Layout
+from bubbleskin.shape.contact import CompliantContact
 from bubbleskin.sim.plant import Plant, PlantParameters
 
 BOARDS = ("wristband7", "wristband19")
@@ -120,12 +122,19 @@ class SimulatedBoard:
 
     `name`: wristband7 or wristband19. `seed`: of sensor noise and spread. `spread`: how much walls, valves and
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
-    reservoir starts full, as on a board that has been powered for a while. `firmware`: what runs the firmware;
-    None is this interpreter.
+    reservoir starts full, as on a board that has been powered for a while. `contact`: whether bubbles push each
+    other, as real ones do; without it each is alone, which shows what the control law itself does. `firmware`: what
+    runs the firmware; None is this interpreter.
     """
 
     def __init__(
-        self, name: str = "wristband7", *, seed: int = 0, spread: float = 0.0, firmware: Firmware | None = None
+        self,
+        name: str = "wristband7",
+        *,
+        seed: int = 0,
+        spread: float = 0.0,
+        contact: bool = True,
+        firmware: Firmware | None = None,
     ):
         self.data = load_board(name)
         if not (math.isfinite(spread) and 0 <= spread <= 0.5):
@@ -135,8 +144,7 @@ class SimulatedBoard:
         n = self.data.BUBBLES
         self.name = name
         self.tick_s: float = self.data.TICK_US * 1e-6
-        parameters = PlantParameters.spread(n, spread, seed) if spread else PlantParameters.nominal(n)
-        self.plant = Plant(parameters, seed=seed)
+        self.plant = make_plant(name, n, seed, spread, contact)
         self.firmware = firmware or InProcessFirmware(self.data, boot_id=seed + 1)
         self.to_device = bytearray()
         self.from_device = bytearray()
@@ -190,6 +198,12 @@ class SimulatedBoard:
     def close(self) -> None:
         """End the firmware."""
         self.firmware.close()
+
+
+def make_plant(name: str, n: int, seed: int, spread: float, contact: bool) -> Plant:
+    """The bubbles of board `name`; the rest as of `SimulatedBoard`."""
+    parameters = PlantParameters.spread(n, spread, seed) if spread else PlantParameters.nominal(n)
+    return Plant(parameters, seed=seed, contact=CompliantContact(Layout.of_board(name, n)) if contact else None)
 
 
 def load_board(name: str) -> ModuleType:

@@ -13,12 +13,18 @@ from numba import njit
 
 from bubbleskin.physics import balloon
 from bubbleskin.physics.balloon import ATMOSPHERE
+from bubbleskin.shape import energy
+from bubbleskin.shape.energy import mechanics as _mechanics
 from bubbleskin.sim import pneumatics
 from bubbleskin.sim.parameters import PlantParameters, Supply
 from bubbleskin.sim.pneumatics import OPEN_LINE
 
 STRETCH_MIN, STRETCH_MAX = 0.8, 6.0
 """Where the model ends: a membrane under suction buckles, an over-inflated one slips off its barb."""
+
+DRAG = 0.05
+"""What slows a centre down, N·s/m: it follows its springs within milliseconds, much faster than air flows. Small
+enough not to show, large enough for steps of 50 µs: h k < 2 DRAG even where six neighbours push (1800 N/m)."""
 
 # All 0 when healthy; `Plant.inject` says what they mean.
 FAULTS = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sensor_absent", "sensor_bias")
@@ -52,7 +58,9 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
     """
 
     @njit(cache=True)
-    def advance(state, constants, airs, supplies, fill_on, vent_on, dt, substeps, pump, dump):  # type: ignore[no-untyped-def]
+    def advance(  # type: ignore[no-untyped-def]
+        state, constants, airs, supplies, fill_on, vent_on, dt, substeps, pump, dump, place, necks, springs, pairs, force
+    ):
         _ = stamp
         air, supply = airs[0], supplies[0]
         h = dt / substeps
@@ -77,6 +85,15 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
             pumped = _pump_flow(air.pressure - ATMOSPHERE, pump, supply.pump_free_flow, supply.pump_stall)
             vented = _orifice_flow(air.pressure, ATMOSPHERE, supply.dump_conductance, b) if dump else 0.0
             drawn = vented
+            if len(place):  # centres follow the forces of necks, base and neighbours; what is left acts on the membranes
+                force[:] = 0.0
+                _mechanics(place, necks, springs[0], pairs, force)
+                for i in range(len(place)):
+                    c = place[i]
+                    kz = springs[0].kz_up if c[2] > c[3] else springs[0].kz_down
+                    c[0] -= h * force[i, 0] / (DRAG + h * springs[0].kxy)
+                    c[1] -= h * force[i, 1] / (DRAG + h * springs[0].kxy)
+                    c[2] -= h * force[i, 2] / (DRAG + h * kz)
             for i in range(len(state)):
                 s, p = state[i], constants[i]
                 # RTṁ of the bubble's ways in and out, W
@@ -93,12 +110,16 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
                 if s.pop_off > 0.0:
                     lost += _orifice_flow(s.pressure, ATMOSPHERE, s.pop_off * OPEN_LINE, b)
 
-                # η dλ/dt = p − P(λ)
+                # η dλ/dt = p − P(λ) − F/(4πR²), F what necks, base and neighbours press on the sphere with
                 sphere = 4.0 / 3.0 * math.pi * p.radius * p.radius * p.radius
                 before = p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
                 membrane = _yeoh_pressure(s.stretch, p.mu, p.c2, p.c3, p.thickness, p.radius)
+                if len(place):
+                    membrane += force[i, 3] / (4.0 * math.pi * place[i, 3] * place[i, 3])
                 stretch = s.stretch + h * (s.pressure - ATMOSPHERE - membrane) / p.viscosity
                 s.stretch = min(max(stretch, STRETCH_MIN), STRETCH_MAX)
+                if len(place):
+                    place[i, 3] = p.radius * s.stretch
                 volume = p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
 
                 # dp/dt = n/V (RTṁ − p dV/dt); the new V and the old p, so that n = 1 keeps pV exactly
@@ -125,4 +146,4 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
     return advance, sense
 
 
-advance, sense = _compile(zlib.crc32((inspect.getsource(balloon) + inspect.getsource(pneumatics)).encode()))
+advance, sense = _compile(zlib.crc32((inspect.getsource(balloon) + inspect.getsource(pneumatics) + inspect.getsource(energy)).encode()))

@@ -6,16 +6,20 @@ bits. Importing this module imports numba, and the first steps compile two funct
 
 import math
 from dataclasses import astuple
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.physics.balloon import ATMOSPHERE, yeoh_pressure
+from bubbleskin.shape.energy import BUBBLE, SPRINGS
 from bubbleskin.sim import kernel
 from bubbleskin.sim.parameters import PlantParameters, Supply
 from bubbleskin.sim.pneumatics import sensor_counts
+
+if TYPE_CHECKING:
+    from bubbleskin.shape.contact import CompliantContact
 
 __all__ = ["Plant", "PlantParameters", "Supply"]
 
@@ -26,6 +30,12 @@ Stable up to twice the settling time of the node: 160 µs against the tube, 100 
 25 µs with both open and no restrictors (C = 0.03 dm³/(s·bar)), which needs a shorter step.
 """
 
+REACH = 18e-3
+"""Bubbles whose barbs are further apart never meet, m: past a radius of 9 mm they slip off."""
+
+BARBS = 10e-6
+"""How far barbs are from where they should be, RMS in m. A perfectly even ring would never fall to one side."""
+
 PA_PER_COUNT = 17.0
 SUPPLY_PA_PER_COUNT = 25.0
 
@@ -34,10 +44,18 @@ class Plant:
     """`len(parameters.mu)` bubbles at rest, at atmospheric pressure, on a reservoir at `supply_pa` gauge.
 
     By default the reservoir is that of a board which has been powered for a while. `seed` is that of the
-    sensors' noise. Attributes: `parameters`, and `time` in s since the start.
+    sensors' noise. `contact` says where the bubbles are and how they push each other; without one, each is alone.
+    Attributes: `parameters`, and `time` in s since the start.
     """
 
-    def __init__(self, parameters: PlantParameters, seed: int = 0, supply_pa: float = 60e3, substep: float = SUBSTEP):
+    def __init__(
+        self,
+        parameters: PlantParameters,
+        seed: int = 0,
+        supply_pa: float = 60e3,
+        substep: float = SUBSTEP,
+        contact: "CompliantContact | None" = None,
+    ):
         n = len(parameters.mu)
         self.parameters = parameters
         self.time = 0.0
@@ -53,6 +71,27 @@ class Plant:
         self._fill_on, self._vent_on = np.zeros(n), np.zeros(n)
         self._noise = np.zeros(n)
         self._rng = np.random.default_rng(seed)
+        self._place = np.zeros((n if contact else 0, 4))
+        """Centre x, y, z and radius of each bubble, m: the state of `shape.energy`. No rows without contact."""
+        self._force = np.zeros_like(self._place)
+        self._necks, self._springs = np.zeros(len(self._place), BUBBLE), np.zeros(1, SPRINGS)
+        self._pairs = np.zeros((0, 2), np.int64)
+        if contact:
+            if len(contact) != n:
+                raise InvalidInput(f"The contact is of {len(contact)} bubbles, the plant has {n}.")
+            self._necks, self._springs[0] = contact.bubbles, contact.springs
+            for axis in ("x", "y"):
+                self._necks[axis] += np.random.default_rng((seed, ord(axis))).normal(0.0, BARBS, n)
+            barbs = np.column_stack([self._necks["x"], self._necks["y"]])
+            gap = np.linalg.norm(barbs[:, None] - barbs[None], axis=2)
+            self._pairs = np.argwhere(np.triu(gap < REACH, 1))
+            self._stand()
+
+    def _stand(self) -> None:
+        """Put every bubble on its barb, touching the base."""
+        if len(self._place):
+            radius = self.parameters.radius * self._state["stretch"]
+            self._place[:] = np.column_stack([self._necks["x"], self._necks["y"], radius, radius])
 
     def advance(self, dt: float, fill_on: ArrayLike, vent_on: ArrayLike, pump: float = 0.0, dump: bool = False) -> None:
         """Let `dt` seconds pass.
@@ -79,6 +118,11 @@ class Plant:
                 substeps,
                 float(pump),
                 bool(dump),
+                self._place,
+                self._necks,
+                self._springs,
+                self._pairs,
+                self._force,
             )
         self.time += dt
 
@@ -116,14 +160,15 @@ class Plant:
         s["node"] = s["pressure"]
         for name in ("fill_energised", "fill_open", "vent_energised", "vent_open"):
             s[name] = False
+        self._stand()
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy everything that changes, faults and noise generator included, for `restore`."""
-        return self._state.copy(), self._air.copy(), self.time, self._rng.bit_generator.state
+        return self._state.copy(), self._air.copy(), self._place.copy(), self.time, self._rng.bit_generator.state
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Go back to a `snapshot` of this plant."""
-        self._state[:], self._air[:], self.time, self._rng.bit_generator.state = snapshot
+        self._state[:], self._air[:], self._place[:], self.time, self._rng.bit_generator.state = snapshot
 
     @property
     def stretch(self) -> NDArray[np.float64]:
@@ -132,8 +177,15 @@ class Plant:
 
     @property
     def height_mm(self) -> NDArray[np.float64]:
-        """Height 2R of each bubble in mm, (n,)."""
+        """Top of each bubble above the base plane in mm, (n,): z + R, which is 2R for one that nobody lifts."""
+        if len(self._place):
+            return np.asarray(1e3 * (self._place[:, 2] + self._place[:, 3]))
         return 2e3 * self.parameters.radius * self._state["stretch"]
+
+    @property
+    def position_m(self) -> NDArray[np.float64]:
+        """Centres x, y, z of the bubbles, (n, 3); no rows without contact."""
+        return self._place[:, :3].copy()
 
     @property
     def pressure_pa(self) -> NDArray[np.float64]:

@@ -99,6 +99,7 @@ class Options:
     seed: int = 0
     spread: float = 0.0
     realtime: bool = False
+    contact: bool = True
 
     @classmethod
     def parse(cls, options: dict[str, str], url: str) -> "Options":
@@ -113,7 +114,7 @@ class Options:
             except ValueError:
                 kind = "a number" if key == "spread" else "a whole number"
                 raise InvalidInput(f"{url} has {key}={text!r}, which is not {kind}.") from None
-        return cls(int(values.get("seed", 0)), values.get("spread", 0.0), bool(values.get("realtime", 0)))
+        return cls(int(values.get("seed", 0)), values.get("spread", 0.0), bool(values.get("realtime", 0)), bool(values.get("contact", 1)))
 
 
 def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[SimulatedTransport, Board]:
@@ -124,7 +125,7 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Simulat
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip
 
-        chip = open_chip(name, seed=chosen.seed, spread=chosen.spread)
+        chip = open_chip(name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact)
         return SimulatedTransport(chip, url, chosen.realtime), chip
     firmware = None
     if scheme == "micropython":
@@ -132,7 +133,9 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Simulat
 
         firmware = MicroPythonFirmware(data, boot_id=chosen.seed + 1)
     try:
-        board = SimulatedBoard(name, seed=chosen.seed, spread=chosen.spread, firmware=firmware)
+        board = SimulatedBoard(
+            name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, firmware=firmware
+        )
     except BaseException:
         if firmware:
             firmware.close()

@@ -12,7 +12,13 @@ if TYPE_CHECKING:
 
 
 def open_chip(
-    name: str, firmware: Path | None = None, *, seed: int = 0, spread: float = 0.0, absent: tuple[str, ...] = ()
+    name: str,
+    firmware: Path | None = None,
+    *,
+    seed: int = 0,
+    spread: float = 0.0,
+    contact: bool = True,
+    absent: tuple[str, ...] = (),
 ) -> "Rp2040Board":
     """The board `name` on an emulated RP2040, booted as far as USB.
 
@@ -28,6 +34,6 @@ def open_chip(
         )
     from bubbleskin.sim.rp2040.board import Rp2040Board
 
-    board = Rp2040Board(name, firmware, seed=seed, spread=spread, absent=absent)
+    board = Rp2040Board(name, firmware, seed=seed, spread=spread, contact=contact, absent=absent)
     board.boot()
     return board

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubbleskin.errors import InvalidInput, LinkError
-from bubbleskin.sim.board import load_board
-from bubbleskin.sim.plant import Plant, PlantParameters
+from bubbleskin.sim.board import load_board, make_plant
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import Chip
 from bubbleskin.sim.rp2040.expanders import Pca9685Bank
@@ -28,7 +27,7 @@ FAULTS = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
 class Rp2040Board:
     """The board `name`, running the UF2 at `firmware`; the names of `SimulatedBoard` mean the same here.
 
-    Time is emulated time. `seed` and `spread` are those of `SimulatedBoard`. `absent`: chips that are not
+    Time is emulated time. `seed`, `spread` and `contact` are those of `SimulatedBoard`. `absent`: chips that are not
     soldered in, such as "converter0" or "driver2".
     """
 
@@ -39,6 +38,7 @@ class Rp2040Board:
         *,
         seed: int = 0,
         spread: float = 0.0,
+        contact: bool = True,
         absent: tuple[str, ...] = (),
     ):
         self.data = load_board(name)
@@ -49,8 +49,7 @@ class Rp2040Board:
         n = self.data.BUBBLES
         self.name = name
         self.tick_s: float = self.data.TICK_US * 1e-6
-        parameters = PlantParameters.spread(n, spread, seed) if spread else PlantParameters.nominal(n)
-        self.plant = Plant(parameters, seed=seed)
+        self.plant = make_plant(name, n, seed, spread, contact)
         self.chip = Chip(firmware)
         self.to_device = bytearray()
         self.from_device = self.chip.from_device
