@@ -11,6 +11,7 @@ from bubbleskin.errors import (
     DeviceSilent,
     InvalidInput,
     LinkError,
+    NoEquilibrium,
     WrongDevice,
 )
 from bubbleskin.layout import Layout
@@ -29,24 +30,31 @@ if TYPE_CHECKING:
         preset,
         read_csv,
     )
+    from bubbleskin.shape.contact import CompliantContact, Shape
+    from bubbleskin.shape.rigid import RigidContact
 
-# The physics takes scipy, which takes a second to import; a script that only shows heights need not wait for it.
-_PHYSICS = (
-    "Calibration",
-    "Table",
-    "YeohBalloon",
-    "YeohFit",
-    "build_table",
-    "fit_sheet",
-    "fit_yeoh",
-    "preset",
-    "read_csv",
-)
+# The physics takes scipy, which takes a second to import, and contact takes numba; a script that only shows heights
+# need not wait for them.
+_LATER = {
+    "Calibration": "physics",
+    "CompliantContact": "shape.contact",
+    "RigidContact": "shape.rigid",
+    "Shape": "shape.contact",
+    "Table": "physics",
+    "YeohBalloon": "physics",
+    "YeohFit": "physics",
+    "build_table": "physics",
+    "fit_sheet": "physics",
+    "fit_yeoh": "physics",
+    "preset": "physics",
+    "read_csv": "physics",
+}
 
 __all__ = [
     "AsyncSkin",
     "BubbleskinError",
     "Calibration",
+    "CompliantContact",
     "DeviceFault",
     "DeviceRefused",
     "DeviceSilent",
@@ -55,6 +63,9 @@ __all__ = [
     "InvalidInput",
     "Layout",
     "LinkError",
+    "NoEquilibrium",
+    "RigidContact",
+    "Shape",
     "Skin",
     "State",
     "Table",
@@ -72,6 +83,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PHYSICS:
+    if name not in _LATER:
         raise AttributeError(f"module 'bubbleskin' has no attribute {name!r}")
-    return getattr(import_module("bubbleskin.physics"), name)
+    return getattr(import_module(f"bubbleskin.{_LATER[name]}"), name)

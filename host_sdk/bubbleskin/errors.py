@@ -27,3 +27,7 @@ class DeviceRefused(BubbleskinError):  # noqa: N818
 
 class DeviceFault(BubbleskinError):  # noqa: N818
     """The device reports faults, or did not do what it was asked in time."""
+
+
+class NoEquilibrium(BubbleskinError):  # noqa: N818
+    """Pressed like this, the bubbles of the model come to no rest."""
