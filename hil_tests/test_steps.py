@@ -144,7 +144,7 @@ def test_a_ramp_to_rest_is_waited_for(skin):
 def test_a_dome_settles_and_stays(skin, watch):
     """The shortest whole way from heights to membranes and back; it runs on emulated chips too."""
     distance = np.linalg.norm(skin.layout.positions_mm, axis=1) / skin.layout.pitch_mm
-    dome = 12.0 - 1.5 * distance**2 / max(distance.max(), 1.0)
+    dome = np.interp(distance, [0, 1, 2], [12.0, 6.8, 5.5])  # so low around the centre that nobody touches
     state = skin.show(dome)
     assert state.settled
     assert state.height_mm == pytest.approx(dome, abs=NEAR)

@@ -258,7 +258,9 @@ def main(arguments: list[str] | None = None) -> int:
                 sheets = min(options.sheets, options.shows) if case.spread else 1
                 steps: list[Step] = []
                 for sheet in range(sheets):
-                    url = f"{options.firmware}://{case.board}?seed={options.seed + sheet}&spread={case.spread}"
+                    url = (
+                        f"{options.firmware}://{case.board}?seed={options.seed + sheet}&spread={case.spread}&contact=0"
+                    )
                     shows = options.shows // sheets + (sheet < options.shows % sheets)
                     with bs.connect(url) as skin:
                         for target in targets(rng, len(skin.layout), case.plateau, shows):

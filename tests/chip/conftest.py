@@ -36,8 +36,8 @@ def emulated(uf2) -> Iterator:
 
     skins = []
 
-    def open_(name: str, **options) -> Skin:
-        board = open_chip(name, uf2(name), **options)
+    def open_(name: str, contact: bool = False, **options) -> Skin:
+        board = open_chip(name, uf2(name), contact=contact, **options)
         transport = SimulatedTransport(board, f"rp2040://{name}")
         skins.append(Skin(drive(AsyncSkin.open(transport, 2.0, simulated=board))))
         return skins[-1]

@@ -159,7 +159,7 @@ def tapped():
     boards = []
 
     def make(board="wristband7", seed=0, spread=0.0, timeout=2.0, **changes):
-        simulated = SimulatedBoard(board, seed=seed, spread=spread)
+        simulated = SimulatedBoard(board, seed=seed, spread=spread, contact=False)
         boards.append(simulated)
         tap = Tap(SimulatedTransport(simulated, board), **changes)
         return Skin(drive(AsyncSkin.open(tap, timeout, simulated=simulated))), tap

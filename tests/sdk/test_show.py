@@ -12,7 +12,7 @@ pytestmark = pytest.mark.timeout(60)
 
 @pytest.fixture
 def skin():
-    with bs.connect("sim://wristband7") as skin:
+    with bs.connect("sim://wristband7?contact=0") as skin:
         yield skin
 
 
@@ -62,7 +62,7 @@ def test_a_fault_is_told_and_kept_until_it_is_cleared(skin):
 @pytest.mark.parametrize(("interrupt", "mode"), [("stop", "holding"), ("vent", "vented")])
 def test_a_show_that_is_interrupted_says_so(interrupt, mode):
     async def script():
-        async with await bs.aconnect("sim://wristband7") as skin, asyncio.timeout(10):
+        async with await bs.aconnect("sim://wristband7?contact=0") as skin, asyncio.timeout(10):
             showing = asyncio.create_task(skin.show(np.full(7, 10.0), over=2.0))
             await skin.sleep(0.5)
             await getattr(skin, interrupt)()

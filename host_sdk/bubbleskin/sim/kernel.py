@@ -59,7 +59,21 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
 
     @njit(cache=True)
     def advance(  # type: ignore[no-untyped-def]
-        state, constants, airs, supplies, fill_on, vent_on, dt, substeps, pump, dump, place, necks, springs, pairs, force
+        state,
+        constants,
+        airs,
+        supplies,
+        fill_on,
+        vent_on,
+        dt,
+        substeps,
+        pump,
+        dump,
+        place,
+        necks,
+        springs,
+        pairs,
+        force,
     ):
         _ = stamp
         air, supply = airs[0], supplies[0]
@@ -85,7 +99,9 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
             pumped = _pump_flow(air.pressure - ATMOSPHERE, pump, supply.pump_free_flow, supply.pump_stall)
             vented = _orifice_flow(air.pressure, ATMOSPHERE, supply.dump_conductance, b) if dump else 0.0
             drawn = vented
-            if len(place):  # centres follow the forces of necks, base and neighbours; what is left acts on the membranes
+            if len(
+                place
+            ):  # centres follow the forces of necks, base and neighbours; what is left acts on the membranes
                 force[:] = 0.0
                 _mechanics(place, necks, springs[0], pairs, force)
                 for i in range(len(place)):
@@ -146,4 +162,6 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
     return advance, sense
 
 
-advance, sense = _compile(zlib.crc32((inspect.getsource(balloon) + inspect.getsource(pneumatics) + inspect.getsource(energy)).encode()))
+advance, sense = _compile(
+    zlib.crc32((inspect.getsource(balloon) + inspect.getsource(pneumatics) + inspect.getsource(energy)).encode())
+)

@@ -114,7 +114,12 @@ class Options:
             except ValueError:
                 kind = "a number" if key == "spread" else "a whole number"
                 raise InvalidInput(f"{url} has {key}={text!r}, which is not {kind}.") from None
-        return cls(int(values.get("seed", 0)), values.get("spread", 0.0), bool(values.get("realtime", 0)), bool(values.get("contact", 1)))
+        return cls(
+            int(values.get("seed", 0)),
+            values.get("spread", 0.0),
+            bool(values.get("realtime", 0)),
+            bool(values.get("contact", 1)),
+        )
 
 
 def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[SimulatedTransport, Board]:
@@ -133,9 +138,7 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Simulat
 
         firmware = MicroPythonFirmware(data, boot_id=chosen.seed + 1)
     try:
-        board = SimulatedBoard(
-            name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, firmware=firmware
-        )
+        board = SimulatedBoard(name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, firmware=firmware)
     except BaseException:
         if firmware:
             firmware.close()
