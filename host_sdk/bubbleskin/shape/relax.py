@@ -90,8 +90,25 @@ def to_edge(s, d, radius):  # type: ignore[no-untyped-def]
 
 
 @njit
+def each_to_edge(d, radius, s):  # type: ignore[no-untyped-def]
+    """`s` = `d` with each bubble's part cut to `radius`; False if that is all the same as `d`."""
+    cut = False
+    for i in range(len(d)):
+        size = math.sqrt(d[i, 0] ** 2 + d[i, 1] ** 2 + d[i, 2] ** 2 + d[i, 3] ** 2)
+        share = 1.0
+        if size > radius:
+            share, cut = radius / size, True
+        for k in range(4):
+            s[i, k] = share * d[i, k]
+    return cut
+
+
+@njit
 def newton_step(g, pairs, blocks, contacts, inverses, radius, accuracy, s, work):  # type: ignore[no-untyped-def]
-    """Fill `s`; return the energy it should save, whether it ends at the edge, and whether curvature was negative."""
+    """Fill `s` by Steihaug's method, each bubble's part no longer than `radius`.
+
+    Returns the energy that it should save, whether it ends at the edge, and whether curvature was negative.
+    """
     r, z, d, Hd = work[0], work[1], work[2], work[3]
     s[:] = 0.0
     r[:] = -g
@@ -100,11 +117,19 @@ def newton_step(g, pairs, blocks, contacts, inverses, radius, accuracy, s, work)
     rz = inner(r, z)
     goal = accuracy * accuracy * inner(r, r)
     saved = 0.0
-    for _ in range(8 * len(g) + 20):
+    for k in range(8 * len(g) + 20):
         hessian(d, pairs, blocks, contacts, Hd)
         dHd = inner(d, Hd)
         rd = inner(r, d)
         edge = to_edge(s, d, radius)
+        if k == 0 and edge < 1.0 and each_to_edge(d, radius, s):
+            # Far from equilibrium one bubble would hold up all others: each goes as far as it may on its own.
+            hessian(s, pairs, blocks, contacts, Hd)
+            saved = inner(r, s) - 0.5 * inner(s, Hd)
+            if saved > 0.0:
+                return saved, True, dHd <= 0.0
+            s[:] = 0.0
+            saved = 0.0
         if dHd <= 0.0 or rd >= edge * dHd:
             s += edge * d
             return saved + edge * rd - 0.5 * edge * edge * dHd, True, dHd <= 0.0

@@ -93,8 +93,8 @@ class RigidContact:
             dt = min(left, first)
             r += dt * rate
             left -= dt
-            if first > left + dt:
-                break
+            if left <= 1e-12:
+                break  # all have what they asked, just
             i, j = (int(k) for k in np.unravel_index(time.argmin(), time.shape))
             for one, other in ((i, j), (j, i)):
                 if rate[one] > 0:
