@@ -1,4 +1,4 @@
-"""The verbs about the membrane: fit, table, plot."""
+"""The verbs about the membrane: fit, table. Their options and readers serve `plot` too."""
 
 from __future__ import annotations
 
@@ -86,13 +86,13 @@ def fit(
 
     Columns: height [mm], pressure [kPa]; also bubble and step (rows of one step are repeats).
     """
-    measurements, found = _fit(data, **options)
+    measurements, found = fit_file(data, **options)
     click.echo(json.dumps(found.as_dict(), indent=2) if as_json else found.report())
     if output:
         _calibration(found, f"fit of {measurements.source}", board, knots, up_to_mm).save(output)
         click.echo(f"wrote {output}", err=True)
     if picture:
-        _draw_fit(found, measurements, picture)
+        draw_fit(found, measurements, picture)
 
 
 @click.command()
@@ -129,10 +129,10 @@ def table(
             )
     elif data:
         sizes = {key: options[key] for key in ("wall", "thickness_mm", "diameter_mm", "diameter_is")}
-        measurements, found = _fit(data, **sizes)
+        measurements, found = fit_file(data, **sizes)
         calibration = _calibration(found, f"fit of {measurements.source}", board, knots, up_to_mm)
     else:
-        balloons = [_balloon(preset, **options)] * bubbles
+        balloons = [balloon(preset, **options)] * bubbles
         calibration = _calibration(balloons, balloons[0].describe() if balloons else "", board, knots, up_to_mm)
     click.echo(json.dumps(calibration.as_dict(), indent=2) if as_json else calibration.report())
     if output:
@@ -149,71 +149,7 @@ def table(
             raise SystemExit(1)
 
 
-@click.group()
-def plot() -> None:
-    """Draw the membrane: curve, fit, table, and the paper's figures 4 and 6."""
-
-
-@plot.command("curve")
-@material_options
-@click.option("--up-to-mm", type=float, default=14.0, show_default=True, help="Where the curve ends.")
-@picture_option("curve")
-def plot_curve(preset: str, up_to_mm: float, output: Path, **options: Any) -> None:
-    """Height against pressure: stable solid, unstable dashed, jumps marked."""
-    from bubbleskin.plot import membrane
-
-    balloon = _balloon(preset, **options)
-    name = f"μ = {balloon.mu / 1e3:.4g} kPa, {balloon.wall} wall"
-    membrane.save(membrane.plot_curve({name: balloon}, up_to_mm=up_to_mm), output)
-    click.echo(f"wrote {output}", err=True)
-
-
-@plot.command("fit")
-@click.argument("data", type=DATA)
-@fit_options
-@picture_option("fit")
-def plot_fit(data: Path, output: Path, **options: Any) -> None:
-    """The points of DATA with error bars, the fitted curves and their 95 % confidence band."""
-    measurements, found = _fit(data, **options)
-    _draw_fit(found, measurements, output)
-
-
-@plot.command("table")
-@click.argument("calibration", type=DATA)
-@click.option("--bubble", type=int, default=0, show_default=True)
-@picture_option("table")
-def plot_table(calibration: Path, bubble: int, output: Path) -> None:
-    """The knots of one bubble of the file CALIBRATION on their curve, with the error between them."""
-    from bubbleskin.physics import Calibration
-    from bubbleskin.plot import membrane
-
-    membrane.save(membrane.plot_table(Calibration.load(calibration).table(bubble)), output)
-    click.echo(f"wrote {output}", err=True)
-
-
-@plot.command("figure4")
-@click.option("--seed", type=int, default=4, show_default=True)
-@picture_option("figure4")
-def plot_figure_4(seed: int, output: Path) -> None:
-    """Like figure 4 of the paper: height against pressure with the model, from simulated measurements."""
-    from bubbleskin.plot import membrane
-
-    membrane.save(membrane.figure_4(seed=seed)[0], output)
-    click.echo(f"wrote {output} (simulated measurements)", err=True)
-
-
-@plot.command("figure6")
-@click.option("--seed", type=int, default=6, show_default=True)
-@picture_option("figure6")
-def plot_figure_6(seed: int, output: Path) -> None:
-    """Like figure 6 of the paper: how bubbles of one sheet differ, from simulated measurements."""
-    from bubbleskin.plot import membrane
-
-    membrane.save(membrane.figure_6(seed=seed)[0], output)
-    click.echo(f"wrote {output} (simulated measurements)", err=True)
-
-
-commands = [fit, table, plot]
+commands = [fit, table]
 
 
 @contextmanager
@@ -227,7 +163,7 @@ def _said() -> Iterator[None]:
             click.echo(str(warning.message), err=True)
 
 
-def _fit(
+def fit_file(
     data: Path,
     *,
     skip_bad_rows: bool = False,
@@ -239,6 +175,7 @@ def _fit(
     diameter_is: str,
     wall: str,
 ) -> tuple[Measurements, YeohFit | SheetFit]:
+    """Read a file of measurements and fit it as its options say."""
     from bubbleskin.physics import fit_measurements, read_csv
 
     with _said():
@@ -255,7 +192,7 @@ def _fit(
         )
 
 
-def _balloon(
+def balloon(
     name: str,
     *,
     mu_kpa: float | None,
@@ -264,6 +201,7 @@ def _balloon(
     c3_pa: float | None,
     **sizes: Any,
 ) -> YeohBalloon:
+    """The balloon that material options describe."""
     from bubbleskin.physics import YeohBalloon, preset
 
     known = preset(name)
@@ -289,7 +227,8 @@ def _calibration(
     return Calibration.build(board, balloons, source=source, height_mm=(5.0, up_to_mm), knots=knots)
 
 
-def _draw_fit(found: YeohFit | SheetFit, measurements: Measurements, output: Path) -> None:
+def draw_fit(found: YeohFit | SheetFit, measurements: Measurements, output: Path) -> None:
+    """Draw a fit over its measurements into a file, and say so."""
     from bubbleskin.plot import membrane
 
     membrane.save(membrane.plot_fit(found, measurements), output)
