@@ -94,9 +94,10 @@ class Rig:
         self.open(SESSION)
 
     def open(self, session):
-        """Open a session; the greeting."""
+        """Open a session, without a tick; the greeting."""
         self.hands.to_device += wire.encode("HELLO", 0, (PROTOCOL_MIN, PROTOCOL_MAX, session))
-        self.tick()
+        self.app.session.poll()
+        self.session = session
         self.key = wire.session_key(self.hands.boot_id, session)
         self._reader.use(self.key)
         self._sequence = 0
