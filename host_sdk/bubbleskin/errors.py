@@ -34,7 +34,7 @@ class DeviceRefused(BubbleskinError):  # noqa: N818
     """The device understood a request and refused it; nothing was changed there."""
 
 
-class Overtaken(DeviceRefused):  # noqa: N818
+class Overtaken(DeviceRefused):
     """A later STOP or VENT came first; what was asked was not applied, and never will be."""
 
 

@@ -11,7 +11,6 @@ from bubble_protocol.messages import HELLO, PING
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.link import wire
 
-
 SESSION = 0x89ABCDEF
 
 

@@ -122,7 +122,9 @@ def test_a_late_reply_answers_no_other_request(scripted):
 
 def test_the_answer_to_another_question_is_no_answer(scripted):
     def answer(request):
-        return b"" if request.id == messages.HELLO else encode("STATE_REPLY", request.sequence, (1, 1), [(1, 2, 3, 0, 0)])
+        return (
+            b"" if request.id == messages.HELLO else encode("STATE_REPLY", request.sequence, (1, 1), [(1, 2, 3, 0, 0)])
+        )
 
     with pytest.raises(bs.DeviceSilent):
         drive(Link(scripted(answer), 1.0).call("INFO"))

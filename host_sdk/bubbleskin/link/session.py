@@ -307,20 +307,23 @@ class Link:
         self._heard = self._heard or bool(data)
         now = self.transport.now()
         for message in self._reader.feed(data):
+            what = message["request"] if message.id == messages.ERROR else message.id & ~messages.REPLY
             if message.id == messages.TELEMETRY:
                 self.telemetry.append(message)
-            elif message.id == messages.HELLO | messages.REPLY:
+            elif what == messages.HELLO:
                 self._greeted(message)
-            elif message.id == messages.ERROR and message["request"] == messages.HELLO:
-                self._greeted(message)
-            elif message.id == messages.PING | messages.REPLY:
-                sent_at = self._pings.pop(message.sequence, None)
-                if sent_at is not None:
-                    self._pongs = {message.sequence: message}
-                    if self.on_ping:
-                        self.on_ping(sent_at, message, now)
+            elif what == messages.PING:
+                self._answered(message, now)
             elif self.open:
                 self._window.settle(message, now)
+
+    def _answered(self, message: wire.Received, now: float) -> None:
+        """A reply to a PING."""
+        sent_at = self._pings.pop(message.sequence, None)
+        if sent_at is not None and message.id != messages.ERROR:
+            self._pongs = {message.sequence: message}
+            if self.on_ping:
+                self.on_ping(sent_at, message, now)
 
     def _write(self, data: bytes, now: float) -> None:
         self._sent_at = now
