@@ -56,7 +56,7 @@ class Link:
         self._heard = False
         self._session = 0
         self._boot_id: int | None = None
-        self._hellos: list[int] = []  # numbers of those that asked for this session
+        self._hellos: dict[int, float] = {}  # when those were sent that asked for this session, by number
         self._hello = 0
         self._greeting: wire.Received | None = None
         self._pings: dict[int, float] = {}  # when they were sent, by number
@@ -95,19 +95,19 @@ class Link:
         They are applied in this order, each once. `DeviceRefused` where one is refused, `Overtaken` where STOP
         or VENT came first, and a `LinkError` where there is no reply within `timeout`: its `outcome_unknown` says
         whether the request may have been applied. `DeviceRestarted` where the device has forgotten everything.
-        The requests after the one that failed may have been applied as well.
+        Where several have failed, the first one's error is raised.
         """
         with self.guard:
             patience = self.timeout if timeout is None else timeout
             deadline = self.transport.now() + patience
             requests = [Request(*call, deadline, patience) for call in calls]
-            await self._ready(requests[0])
             if requests[0].name == "PING":
                 return [await self._call_ping(request) for request in requests]
-            for request in requests:
-                self._window.submit(request)
             try:
-                await self.wait(deadline, lambda: _decided(requests))
+                for request in requests:
+                    self._window.submit(request)
+                await self._ready(requests[0])
+                await self.wait(deadline, lambda: all(request.done for request in requests))
             finally:
                 for request in requests:
                     if not request.done:
@@ -147,15 +147,11 @@ class Link:
         if self.open:
             return
         async with self._opening:
-            if self.open:
-                return
-            before = self._boot_id
-            try:
-                await self._open(request.deadline)
-            except DeviceSilent:
-                raise self._silence(request) from None
-            if before not in (None, self._boot_id) and not request.urgent:
-                raise sentences.restarted(request, self.transport.name)
+            while not self.open and not request.done:
+                try:
+                    await self._open(request.deadline)
+                except DeviceSilent:
+                    raise self._silence(request) from None
 
     async def _open(self, deadline: float) -> wire.Received:
         self._window.end(lambda request: sentences.abandoned(request, self.transport.name))
@@ -176,8 +172,6 @@ class Link:
             low, high = reply["protocol_min"], reply["protocol_max"]
             if high < PROTOCOL_MIN or low > PROTOCOL_MAX:
                 raise WrongDevice(sentences.version(low, high))
-            if len(self._hellos) == 1:
-                self._window.trip.measured(self.transport.now() - now)
             self._begin(reply)
             if self.transport.blocks and not self._background:
                 self._background = keepalive.start(self, self._event_loop)
@@ -193,8 +187,9 @@ class Link:
 
     def _say_hello(self, now: float) -> None:
         self._hello = self._hello + 1 & 0xFFFF
-        if not self.open:
-            self._hellos.append(self._hello)
+        if self.open:
+            self._hellos.clear()  # an answer to an earlier one may be of an earlier boot
+        self._hellos[self._hello] = now
         self._greeting = None
         self._asked_at = now
         # The zero ends whatever half frame stands on the line.
@@ -202,18 +197,21 @@ class Link:
 
     def _greeted(self, message: wire.Received) -> None:
         """A reply to HELLO, or its refusal: what opening waits for, or whether the device still is the same."""
+        sent_at = self._hellos.get(message.sequence)
+        if sent_at is None:
+            return
+        self._window.trip.measured(self.transport.now() - sent_at)
         if not self.open:
-            if message.sequence in self._hellos:
-                self._greeting = message
-        elif message.sequence == self._hello:
-            if message.id == messages.ERROR:
-                self.open = False
-                self._window.end(lambda request: sentences.taken(request, self.transport.name))
-            elif message["boot_id"] != self._boot_id:
-                self._window.end(lambda request: sentences.restarted(request, self.transport.name), urgent=False)
-                self._begin(message)
+            self._greeting = message
+        elif message.id == messages.ERROR:
+            self.open = False
+            self._window.end(lambda request: sentences.taken(request, self.transport.name))
+        elif message["boot_id"] != self._boot_id:
+            self._begin(message)
 
     def _begin(self, reply: wire.Received) -> None:
+        if self._boot_id not in (None, reply["boot_id"]):
+            self._window.end(lambda request: sentences.restarted(request, self.transport.name), waiting=True)
         self._boot_id = reply["boot_id"]
         key = wire.session_key(reply["boot_id"], self._session)
         self._window.begin(key, max(1, reply["window"]))
@@ -252,10 +250,10 @@ class Link:
             return
         if not self.open:
             return
-        for late in self._window.expired(now):
-            if late.sends:
-                late.error = self._silence(late)
-                return
+        late = self._window.expired(now)
+        if late:
+            late.error = self._silence(late)
+            return
         data = self._window.outgoing(now)
         if data:
             self._write(data, now)
@@ -291,6 +289,7 @@ class Link:
 
     async def _call_ping(self, request: Request) -> wire.Received:
         """PING has no place among the other requests: it changes nothing and is answered at once."""
+        await self._ready(request)
         while (now := self.transport.now()) < request.deadline and self.open:
             number = self._send_ping(request.fixed[0], now)
             request.sends += 1
@@ -321,6 +320,7 @@ class Link:
         """A reply to a PING."""
         sent_at = self._pings.pop(message.sequence, None)
         if sent_at is not None and message.id != messages.ERROR:
+            self._window.trip.measured(now - sent_at)
             self._pongs = {message.sequence: message}
             if self.on_ping:
                 self.on_ping(sent_at, message, now)
@@ -395,16 +395,6 @@ def drive(coroutine: Coroutine[Any, Any, _T]) -> _T:
         return finished.value
     coroutine.close()
     raise RuntimeError("a coroutine of the synchronous link has suspended")
-
-
-def _decided(requests: Sequence[Request]) -> bool:
-    """Whether all are answered, or all up to one that has failed."""
-    for request in requests:
-        if not request.done:
-            return False
-        if request.error or (request.reply and request.reply.id == messages.ERROR):
-            return True
-    return True
 
 
 def _refused_hello(reply: wire.Received) -> LinkError:

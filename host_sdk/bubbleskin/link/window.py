@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from bubble_protocol import codec, framing, messages
@@ -32,6 +32,7 @@ class Request:
     frame: bytes = b""
     sends: int = 0
     sent: float = 0.0
+    resent: float = 0.0
     due: float = 0.0
     """When it is sent again."""
     patience: float = 0.0
@@ -54,7 +55,11 @@ class Request:
 
 
 class RoundTrip:
-    """How long to wait for an answer before sending again: RFC 6298, with Karn's rule. Seconds."""
+    """How long to wait for an answer before sending again: RFC 6298, with Karn's rule. Seconds.
+
+    Only answers to what was sent once, or that tell which sending they answer as those to PING and HELLO do, are
+    measured; so waiting longer for one request says nothing of the next.
+    """
 
     FIRST = 0.25
     FLOOR = 0.03
@@ -63,29 +68,21 @@ class RoundTrip:
     def __init__(self) -> None:
         self.smoothed: float | None = None
         self.variation = 0.0
-        self._backed_off = 0.0
 
     @property
     def timeout(self) -> float:
         """For a request that is sent now."""
         if self.smoothed is None:
-            return max(self.FIRST, self._backed_off)
-        return min(max(self.FLOOR, self.smoothed + 4 * self.variation, self._backed_off), self.MOST)
+            return self.FIRST
+        return min(max(self.FLOOR, self.smoothed + 4 * self.variation), self.MOST)
 
     def measured(self, seconds: float) -> None:
-        """An answer to what was sent once came after so long."""
-        self._backed_off = 0.0
+        """An answer came after so long."""
         if self.smoothed is None:
             self.smoothed, self.variation = seconds, seconds / 2
         else:
             self.variation += (abs(self.smoothed - seconds) - self.variation) / 4
             self.smoothed += (seconds - self.smoothed) / 8
-
-    def missed(self, patience: float) -> float:
-        """No answer came within `patience`; how long to wait for the next."""
-        patience = min(2 * patience, self.MOST)
-        self._backed_off = max(self._backed_off, patience)
-        return patience
 
 
 class Window:
@@ -124,7 +121,8 @@ class Window:
         frames = []
         for request in self._flight.values():
             if request.due <= now:
-                request.patience = self.trip.missed(request.patience)
+                if now >= request.resent + request.patience:
+                    request.patience = min(2 * request.patience, self.trip.MOST)
                 frames.append(self._send(request, now))
         while self._waiting and self._has_room(self._waiting[0]):
             request = self._waiting.popleft()
@@ -152,9 +150,9 @@ class Window:
         """Whether the oldest request has been sent again and again."""
         return bool(self._flight) and self._oldest().sends >= LOST
 
-    def expired(self, now: float) -> Iterator[Request]:
-        """The requests whose deadline has passed."""
-        return (request for request in [*self._flight.values(), *self._waiting] if request.deadline <= now)
+    def expired(self, now: float) -> Request | None:
+        """A request that is under way and whose deadline has passed."""
+        return next((request for request in self._flight.values() if request.deadline <= now), None)
 
     def settle(self, message: wire.Received, now: float) -> None:
         """Give a reply or an error to its request; one that nobody waits for is dropped."""
@@ -170,18 +168,18 @@ class Window:
         if request.sends == 1:
             self.trip.measured(now - request.sent)
         request.reply = message
-        if request.urgent:  # what is older has been answered on the way, or overtaken: ask which
-            for other in self._flight.values():
-                if other.number < request.number:
-                    other.due = now
+        # The device keeps the order: what is older has been answered too, or overtaken, and the answer got lost.
+        for other in self._flight.values():
+            if other.number < request.number and other.resent <= request.resent:
+                other.due = now
 
-    def end(self, reason: Callable[[Request], BubbleskinError], *, urgent: bool = True) -> None:
-        """The session is over: everything in flight fails, and what waits, `urgent` requests unless they are spared."""
+    def end(self, reason: Callable[[Request], BubbleskinError], *, waiting: bool = False) -> None:
+        """The session is over: everything in flight fails, and with `waiting` what has not been sent and is not urgent."""
         for request in self._flight.values():
             request.error = reason(request)
         self._flight.clear()
-        for request in list(self._waiting):
-            if urgent or not request.urgent:
+        if waiting:
+            for request in [request for request in self._waiting if not request.urgent]:
                 request.error = reason(request)
                 self._waiting.remove(request)
 
@@ -198,5 +196,6 @@ class Window:
 
     def _send(self, request: Request, now: float) -> bytes:
         request.sends += 1
+        request.resent = now
         request.due = now + request.patience
         return request.frame
