@@ -157,12 +157,14 @@ class Link:
         self._window.end(lambda request: sentences.abandoned(request, self.transport.name))
         self.open = False
         self._new_session()
-        patience = self._window.trip.FIRST
+        trip = self._window.trip
+        patience = trip.timeout
         while (now := self.transport.now()) < deadline:
             self._say_hello(now)
             await self.wait(min(deadline, now + patience), lambda: self._greeting is not None)
             reply = self._greeting
             if reply is None:
+                patience = trip.longer(patience)
                 continue
             if reply.id == messages.ERROR:
                 if reply["error"] != messages.OVERTAKEN:

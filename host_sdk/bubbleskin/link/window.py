@@ -63,7 +63,7 @@ class RoundTrip:
 
     FIRST = 0.25
     FLOOR = 0.03
-    MOST = 0.5
+    MOST = 0.25
 
     def __init__(self) -> None:
         self.smoothed: float | None = None
@@ -74,7 +74,11 @@ class RoundTrip:
         """For a request that is sent now."""
         if self.smoothed is None:
             return self.FIRST
-        return min(max(self.FLOOR, self.smoothed + 4 * self.variation), self.MOST)
+        return max(self.FLOOR, self.smoothed + 4 * self.variation)
+
+    def longer(self, patience: float) -> float:
+        """How long to wait the next time, when nothing has come within `patience`."""
+        return min(2 * patience, max(self.MOST, self.timeout))
 
     def measured(self, seconds: float) -> None:
         """An answer came after so long."""
@@ -122,7 +126,7 @@ class Window:
         for request in self._flight.values():
             if request.due <= now:
                 if now >= request.resent + request.patience:
-                    request.patience = min(2 * request.patience, self.trip.MOST)
+                    request.patience = self.trip.longer(request.patience)
                 frames.append(self._send(request, now))
         while self._waiting and self._has_room(self._waiting[0]):
             request = self._waiting.popleft()
