@@ -25,7 +25,9 @@ from bubbleskin.errors import BubbleskinError, DeviceRefused, DeviceRestarted, L
 from bubbleskin.link.session import Link
 from bubbleskin.sim.faults import FaultLink, Faults
 
-FAULTS = Faults(drop=0.10, duplicate=0.05, flip=0.005, truncate=0.005, reorder=0.02, split=0.02, stall=0.0001, reset=0.0002)
+FAULTS = Faults(
+    drop=0.10, duplicate=0.05, flip=0.005, truncate=0.005, reorder=0.02, split=0.02, stall=0.0001, reset=0.0002
+)
 WORKERS = 12
 BASE = 9000
 """SHOW's first two heights are the command's number to this base."""
