@@ -34,7 +34,7 @@ def test_info_says_what_is_there(skin, target):
     assert 0.001 <= info.tick <= 0.02
     assert 0 < info.height_rest_mm < info.height_max_mm
     assert info.pressure_max_kpa > 0
-    assert info.protocol[0] <= 1 <= info.protocol[1]
+    assert info.protocol[0] <= 2 <= info.protocol[1]
     assert info.same_schema
     assert len(info.firmware.split(".")) == 3
     if "://wristband" in target:
@@ -50,7 +50,7 @@ def test_health_of_a_board_at_rest(skin):
     assert health.mode == "vented"
     assert health.exceptions == 0
     assert health.frames_bad == before.frames_bad
-    assert health.frames_good == before.frames_good + 1
+    assert 1 <= health.frames_good - before.frames_good <= 20, "and what keeps the link alive"
     assert health.late_ticks == before.late_ticks
     assert 55 < health.supply_kpa < 65
     assert skin.faults() == {}

@@ -6,70 +6,73 @@ buffer that grows and allocates nothing in steady state.
 
 from array import array
 
-from bubble_firmware import control
-from bubble_firmware.table import KNOTS_MAX
-from bubble_firmware.ticks import BINS
+from bubble_firmware import delivery
+from bubble_firmware.requests import NO_ELEMENT, Requests
 from bubble_protocol import codec, framing, messages
 from bubble_protocol.crc import crc32_into, crc32_word
-from bubble_protocol.messages import VENTED
-from bubble_protocol.portable import heap_free
+from bubble_protocol.portable import const, heap_free
 from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
 
 _CHUNK = 256  # bytes taken from the link in one tick
-_KNOTS_PER_MESSAGE = 48
-_NO_ELEMENT = 255
+_PAYLOAD_AT = framing.Decoder.PAYLOAD_AT
+_BUDGET = 4  # requests handled in one tick; one that takes long is worth as many
+_HELLO = const(0x01)
+_PING = const(0x02)
+_STOP = const(0x0B)
+_VENT = const(0x0C)
 
 
-class Session:
+class Session(Requests):
     """Requests in, replies and telemetry out, for one `App`."""
 
     def __init__(self, app):
         self._app = app
-        self._decoder = framing.Decoder(crc32_into)
+        self._delivery = delivery.Delivery(app.hands.boot_id & 0xFFFFFFFF)
+        self._decoder = framing.Decoder(crc32_into, self._delivery.key)
         self._chunk = bytearray(_CHUNK)
-        self._frame = bytearray(framing.FRAME_MAX)
+        self._frame = bytearray(framing.FRAME_MAX)  # what is sent and not kept
         self._values = array("i", bytearray(4 * framing.PAYLOAD_MAX))
-        self._handling = 0  # id of the request being handled
+        self._handling = 0  # id of the request being handled; 0 once it is answered
+        self._sequence = 0  # its number
+        self._ordered = False  # whether its reply is kept
+        self._budget = 0
+        self._owed = 0  # how many of the last replies have found no room yet
         self._period = 0  # telemetry, ticks; 0: none
         self._wait = 0
         self._telemetry_sequence = 0
-        self._owed = 0  # length of a reply in `_frame` that found no room
         self.telemetry_dropped = 0
+        self.heard = 0  # frames of the open session since boot, modulo 65536: the host is alive
+        self.capabilities = messages.DELIVERY
         self._heap_free = heap_free()
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
         self._name = (app.board.NAME.encode() + bytes(16))[:16]  # bytes: a letter of a string can be an allocation
         boot_id = app.hands.boot_id & 0xFFFFFFFF
         self._boot_id = boot_id - (boot_id >> 31 << 32)  # the same 32 bits as a signed word
-        self._requests = {
-            messages.HELLO: self._hello,
-            messages.PING: self._ping,
-            messages.INFO: self._info,
-            messages.SHOW: self._show,
-            messages.STATE: self._state,
-            messages.SUBSCRIBE: self._subscribe,
-            messages.TABLE_WRITE: self._table_write,
-            messages.TABLE_COMMIT: self._table_commit,
-            messages.TABLE_READ: self._table_read,
-            messages.STOP: self._stop,
-            messages.VENT: self._vent,
-            messages.CLEAR: self._clear,
-            messages.TICKS: self._ticks,
-            messages.RESTART: self._restart,
-        }
+        self._requests = self._handlers()
+        self._requests[messages.HELLO] = self._hello
+        self._requests[messages.SUBSCRIBE] = self._subscribe
+        self._slow = {messages.TABLE_WRITE, messages.TABLE_COMMIT, messages.TABLE_READ, messages.TICKS}
 
     def poll(self):
         """Handle what has come since the last tick; send telemetry when it is due."""
-        if self._owed and self._app.hands.send(self._frame, self._owed):
-            self._owed = 0
+        if self._owed:
+            self._pay()
         chunk = self._chunk
         decoder = self._decoder
+        kept = self._delivery
+        self._budget = _BUDGET
         end = self._app.hands.receive(chunk)
         at = 0
         while at < end:
             at = decoder.feed(chunk, at, end)
             if decoder.length:
-                self._handle(decoder.message_id, decoder.length - framing.HEADER)
+                self._arrive(decoder.message_id, decoder.sequence)
+        while kept.early and self._budget > 0:
+            length = kept.waiting()
+            if not length:
+                break
+            self._apply(kept.slot(), length)
         if self._period:
             self._wait -= 1
             if self._wait <= 0:
@@ -80,24 +83,80 @@ class Session:
         """Tell the host whose request was being handled that the device failed at it: once, if the link still works."""
         if self._handling:
             try:
-                self._refuse(messages.FAULTED, 0, _NO_ELEMENT, 0, 0, 0)
+                self._refuse(messages.FAULTED, 0, NO_ELEMENT, 0, 0, 0)
             except Exception:
                 pass
             self._handling = 0
 
-    def _handle(self, message_id, size):
+    # Whose turn it is.
+
+    def _arrive(self, message_id, sequence):
+        """A frame stands in the decoder. HELLO and PING know no order, STOP and VENT overtake it."""
+        decoder = self._decoder
+        kept = self._delivery
+        if message_id == _HELLO:
+            self._answer_aside(message_id, sequence)
+            return
+        self.heard = (self.heard + 1) & 0xFFFF
+        if message_id == _PING:
+            self._answer_aside(message_id, sequence)
+            return
+        ahead = (sequence - kept.expected) & 0xFFFF
+        if ahead >= 0x10000 - delivery.KEPT:
+            self._answer_again(message_id, sequence)
+        elif ahead < delivery.KEPT and (message_id == _STOP or message_id == _VENT):
+            if self._owed:
+                self._owed += ahead
+            while ahead:
+                kept.advance()
+                ahead -= 1
+            self._apply(decoder.frame, decoder.length)
+        elif ahead == 0 and self._budget > 0:
+            self._apply(decoder.frame, decoder.length)
+        elif ahead < delivery.WINDOW:
+            kept.keep(sequence, decoder.frame, decoder.length)
+
+    def _apply(self, frame, length):
+        """Handle the request whose turn it is."""
+        message_id = frame[1]
+        self._budget -= _BUDGET if message_id in self._slow else 1
+        self._sequence = self._delivery.expected
+        self._delivery.advance()
+        self._ordered = True
+        self._handle(message_id, frame, length - framing.HEADER)
+
+    def _answer_aside(self, message_id, sequence):
+        decoder = self._decoder
+        self._sequence = sequence
+        self._ordered = False
+        self._handle(message_id, decoder.frame, decoder.length - framing.HEADER)
+
+    def _answer_again(self, message_id, sequence):
+        """A request that has had its turn: its reply once more, or that it was overtaken."""
+        kept = self._delivery
+        place = sequence % delivery.KEPT
+        if kept.lengths[place]:
+            self._app.hands.send(kept.replies[place], kept.lengths[place])
+        else:
+            self._handling = message_id
+            self._sequence = sequence
+            self._ordered = False
+            self._refuse(messages.OVERTAKEN, 0, NO_ELEMENT, 0, 0, 0)
+
+    # Whether it can be meant.
+
+    def _handle(self, message_id, frame, size):
         self._handling = message_id
         handler = self._requests.get(message_id)
         if handler is None:
-            self._refuse(messages.UNKNOWN_MESSAGE, 0, _NO_ELEMENT, message_id, 0, 0)
-        else:
-            message = codec.BY_ID[message_id]
-            count = message.unpack(self._decoder.frame, framing.Decoder.PAYLOAD_AT, size, self._values)
-            if count < 0:
-                most = framing.PAYLOAD_MAX if message.stride else message.fixed_size
-                self._refuse(messages.WRONG_LENGTH, 0, _NO_ELEMENT, size, message.fixed_size, most)
-            elif self._within_limits(message, count):
-                handler(count)
+            self._refuse(messages.UNKNOWN_MESSAGE, 0, NO_ELEMENT, message_id, 0, 0)
+            return
+        message = codec.BY_ID[message_id]
+        count = message.unpack(frame, _PAYLOAD_AT, size, self._values)
+        if count < 0:
+            self._refuse(messages.WRONG_LENGTH, 0, NO_ELEMENT, size, message.least, framing.PAYLOAD_MAX)
+        elif self._within_limits(message, count):
+            handler(count)
         self._handling = 0
 
     def _within_limits(self, message, count):
@@ -107,7 +166,7 @@ class Session:
             return True
         fixed = len(message.fixed)
         number = at
-        element = _NO_ELEMENT
+        element = NO_ELEMENT
         if at >= fixed:
             number = fixed + (at - fixed) % message.stride_values
             element = (at - fixed) // message.stride_values
@@ -119,15 +178,25 @@ class Session:
         )
         return False
 
-    # Requests. Each handler answers once; `self._values` holds the request's fields, then the reply's.
+    # The link's own requests; the others are in `requests`.
 
     def _hello(self, count):
         values = self._values
         board = self._app.board
         if values[0] > PROTOCOL_MAX or values[1] < PROTOCOL_MIN:
-            self._refuse(messages.NO_COMMON_PROTOCOL, 1, _NO_ELEMENT, values[1], PROTOCOL_MIN, PROTOCOL_MAX)
+            self._refuse(messages.NO_COMMON_PROTOCOL, 1, NO_ELEMENT, values[1], PROTOCOL_MIN, PROTOCOL_MAX)
             return
-        self._period = 0  # a new host has not subscribed
+        opened = self._delivery.open(self._decoder.frame, _PAYLOAD_AT + 2)
+        if opened == delivery.NO_SESSION:
+            self._refuse(messages.OUT_OF_RANGE, 2, NO_ELEMENT, 0, 1, 0x3FFFFFFF)
+            return
+        if opened == delivery.STALE:
+            self._refuse(messages.OVERTAKEN, 2, NO_ELEMENT, 0, 0, 0)
+            return
+        if opened == delivery.OPENED:
+            self._owed = 0
+            self._period = 0  # a new host has not subscribed
+        self.heard = (self.heard + 1) & 0xFFFF
         values[0] = PROTOCOL_MIN
         values[1] = PROTOCOL_MAX
         values[2] = self._schema_crc
@@ -140,162 +209,24 @@ class Session:
         values[25] = board.HEIGHT_REST_UM
         values[26] = board.HEIGHT_MAX_UM
         values[27] = board.PRESSURE_MAX_PA
-        values[28] = 1  # one request at a time
-        values[29] = 0
+        values[28] = delivery.WINDOW
+        values[29] = self.capabilities
         values[30] = self._app.tables.crc
         self._reply(0)
-
-    def _ping(self, count):
-        self._values[1] = self._app.ticks
-        self._values[2] = self._app.hands.phase_us()
-        self._reply(0)
-
-    def _info(self, count):
-        app = self._app
-        values = self._values
-        values[0] = app.ticks
-        values[1] = app.hands.late_ticks
-        values[2] = app.tick_worst_us
-        values[3] = app.exceptions
-        values[4] = self._decoder.good
-        values[5] = self._decoder.bad
-        values[6] = self.telemetry_dropped
-        if app.mode == VENTED:  # counting takes longer than a tick
-            app.hands.slack()
-            self._heap_free = heap_free()
-        values[7] = self._heap_free
-        values[8] = app.supply.pressure_pa
-        values[9] = app.tables.crc
-        values[10] = app.mode
-        values[11] = app.faults
-        test = app.self_test
-        values[12] = test.outcome
-        values[13] = test.untrue_zero
-        values[14] = test.unfilled
-        values[15] = test.unvented
-        self._reply(0)
-
-    def _show(self, count):
-        values = self._values
-        board = self._app.board
-        if count != board.BUBBLES:
-            self._refuse(messages.WRONG_COUNT, 1, _NO_ELEMENT, count, board.BUBBLES, board.BUBBLES)
-            return
-        if self._app.faults & messages.VENTING:
-            self._refuse(messages.BOARD_FAULT, 0, _NO_ELEMENT, self._app.faults, 0, 0)
-            return
-        high = control.first_above(values, 1, 1 + count, board.HEIGHT_MAX_UM)
-        if high >= 0:
-            self._refuse(messages.OUT_OF_RANGE, 1, high - 1, values[high], 0, board.HEIGHT_MAX_UM)
-            return
-        self._app.show(values, 1, values[0])
-        self._acknowledge()
-
-    def _state(self, count):
-        self._reply(self._fill_state())
 
     def _subscribe(self, count):
         self._period = self._wait = self._values[0]
         self._telemetry_sequence = 0
         self._acknowledge()
 
-    def _table_write(self, count):
-        values = self._values
-        bubble = values[0]
-        first = values[1]
-        total = values[2]
-        if not self._is_bubble(bubble):
-            return
-        if first + count > total:
-            self._refuse(messages.OUT_OF_RANGE, 1, _NO_ELEMENT, first, 0, total - count if total > count else 0)
-            return
-        tables = self._app.tables
-        tables.write_size(bubble, total)
-        for index in range(count):
-            tables.write_knot(bubble, first + index, values[3 + 2 * index], values[4 + 2 * index])
-        self._acknowledge()
-
-    def _table_commit(self, count):
-        app = self._app
-        tables = app.tables
-        crc = self._values[0]
-        flaw = tables.first_flaw(app.board.HEIGHT_MAX_UM, app.board.PRESSURE_MAX_PA)
-        if flaw >= 0:
-            self._refuse(messages.BAD_TABLE, 0, flaw // KNOTS_MAX, flaw % KNOTS_MAX, 0, app.board.PRESSURE_MAX_PA)
-        elif crc != tables.received_crc():
-            self._refuse(messages.BAD_CRC, 0, _NO_ELEMENT, 0, 0, 0)
-        else:
-            tables.swap()
-            app.bubbles.use_tables()
-            self._values[0] = tables.crc
-            self._reply(0)
-
-    def _table_read(self, count):
-        values = self._values
-        bubble = values[0]
-        first = values[1]
-        if not self._is_bubble(bubble):
-            return
-        tables = self._app.tables
-        total = tables.sizes[bubble]
-        if first >= total:
-            self._refuse(messages.OUT_OF_RANGE, 1, _NO_ELEMENT, first, 0, total - 1)
-            return
-        count = total - first
-        if count > _KNOTS_PER_MESSAGE:
-            count = _KNOTS_PER_MESSAGE
-        values[2] = total
-        for index in range(count):
-            tables.read_knot(bubble, first + index, values, 3 + 2 * index)
-        self._reply(count)
-
-    def _stop(self, count):
-        self._app.stop()
-        self._acknowledge()
-
-    def _vent(self, count):
-        self._app.vent()
-        self._acknowledge()
-
-    def _clear(self, count):
-        self._app.clear()
-        self._acknowledge()
-
-    def _ticks(self, count):
-        app = self._app
-        values = self._values
-        values[0] = app.work_us
-        values[1] = app.delay_us
-        for index in range(BINS):
-            values[2 + 2 * index] = app.worked[index]
-            values[3 + 2 * index] = app.delayed[index]
-        self._reply(BINS)
-
-    def _restart(self, count):
-        into = self._values[0]
-        self._acknowledge()
-        self._app.restart(into)
-
     # Sending.
-
-    def _is_bubble(self, bubble):
-        if bubble < self._app.board.BUBBLES:
-            return True
-        self._refuse(messages.OUT_OF_RANGE, 0, _NO_ELEMENT, bubble, 0, self._app.board.BUBBLES - 1)
-        return False
-
-    def _fill_state(self):
-        self._values[0] = self._app.ticks
-        self._values[1] = self._app.mode
-        self._app.bubbles.report(self._values, 2)
-        return self._app.board.BUBBLES
 
     def _acknowledge(self):
         self._values[0] = self._app.ticks
         self._reply(0)
 
     def _reply(self, count):
-        self._send(self._handling | messages.REPLY, self._decoder.sequence, count)
+        self._send(self._handling | messages.REPLY, count)
 
     def _refuse(self, error, field, element, asked, low, high):
         values = self._values
@@ -306,23 +237,41 @@ class Session:
         values[4] = asked
         values[5] = low
         values[6] = high
-        self._send(messages.ERROR, self._decoder.sequence, 0)
+        self._send(messages.ERROR, 0)
+
+    def _send(self, message_id, count):
+        """Answer the request being handled, and keep the answer of one that has a turn."""
+        self._handling = 0
+        if self._ordered:
+            kept = self._delivery
+            place = self._sequence % delivery.KEPT
+            kept.lengths[place] = self._pack(kept.replies[place], message_id, self._sequence, count)
+            self._owed += 1
+            self._pay()
+        else:
+            self._app.hands.send(self._frame, self._pack(self._frame, message_id, self._sequence, count))
+
+    def _pay(self):
+        """Send the replies that are owed, in order, as far as there is room."""
+        kept = self._delivery
+        if self._owed > delivery.KEPT:
+            self._owed = delivery.KEPT
+        while self._owed:
+            place = (kept.expected - self._owed) % delivery.KEPT
+            if kept.lengths[place] and not self._app.hands.send(kept.replies[place], kept.lengths[place]):
+                return
+            self._owed -= 1
 
     def _telemetry(self):
         self._telemetry_sequence = (self._telemetry_sequence + 1) & 0xFFFF
-        if self._owed:  # a reply comes first, and stands in the frame
+        if self._owed:  # a reply comes first
             self.telemetry_dropped += 1
             return
-        length = self._pack(messages.TELEMETRY, self._telemetry_sequence, self._fill_state())
+        length = self._pack(self._frame, messages.TELEMETRY, self._telemetry_sequence, self._fill_state())
         if not self._app.hands.send(self._frame, length):
             self.telemetry_dropped += 1
 
-    def _send(self, message_id, sequence, count):
-        length = self._pack(message_id, sequence, count)
-        self._owed = 0 if self._app.hands.send(self._frame, length) else length
-
-    def _pack(self, message_id, sequence, count):
-        frame = self._frame
-        end = codec.BY_ID[message_id].pack(self._values, count, frame, framing.Decoder.PAYLOAD_AT)
+    def _pack(self, frame, message_id, sequence, count):
+        end = codec.BY_ID[message_id].pack(self._values, count, frame, _PAYLOAD_AT)
         framing.put_header(frame, message_id, sequence)
-        return framing.seal(frame, end - 1, crc32_into)
+        return framing.seal(frame, end - 1, crc32_into, self._delivery.key)

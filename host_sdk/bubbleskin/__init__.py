@@ -8,10 +8,12 @@ from bubbleskin.errors import (
     BubbleskinError,
     DeviceFault,
     DeviceRefused,
+    DeviceRestarted,
     DeviceSilent,
     InvalidInput,
     LinkError,
     NoEquilibrium,
+    Overtaken,
     WrongDevice,
 )
 from bubbleskin.layout import Layout
@@ -57,6 +59,7 @@ __all__ = [
     "CompliantContact",
     "DeviceFault",
     "DeviceRefused",
+    "DeviceRestarted",
     "DeviceSilent",
     "Health",
     "Info",
@@ -66,6 +69,7 @@ __all__ = [
     "NoEquilibrium",
     "RigidContact",
     "Shape",
+    "Overtaken",
     "Skin",
     "State",
     "Table",

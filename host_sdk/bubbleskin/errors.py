@@ -10,11 +10,20 @@ class InvalidInput(BubbleskinError, ValueError):  # noqa: N818 - a user reads it
 
 
 class LinkError(BubbleskinError):
-    """No device can be reached, or the one that was reached has gone."""
+    """No device can be reached, or the one that was reached has gone.
+
+    `outcome_unknown`: whether what was asked may have been applied. It is never applied later, nor twice.
+    """
+
+    outcome_unknown = False
 
 
 class DeviceSilent(LinkError, TimeoutError):  # noqa: N818
     """The device has not answered in time."""
+
+
+class DeviceRestarted(LinkError):  # noqa: N818
+    """The device has restarted: it vents and has forgotten everything. Nothing was sent again."""
 
 
 class WrongDevice(LinkError):  # noqa: N818
@@ -23,6 +32,10 @@ class WrongDevice(LinkError):  # noqa: N818
 
 class DeviceRefused(BubbleskinError):  # noqa: N818
     """The device understood a request and refused it; nothing was changed there."""
+
+
+class Overtaken(DeviceRefused):
+    """A later STOP or VENT came first; what was asked was not applied, and never will be."""
 
 
 class DeviceFault(BubbleskinError):  # noqa: N818

@@ -13,7 +13,7 @@ from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput, LinkErro
 from bubbleskin.layout import Layout
 from bubbleskin.link.session import Link, drive
 from bubbleskin.link.transport import Transport
-from bubbleskin.link.wire import crc32
+from bubbleskin.link.wire import Received, crc32
 from bubbleskin.records import Health, Info, State, TickHistogram
 from bubbleskin.shape.heightfield import Heights, sample
 
@@ -27,6 +27,7 @@ SETTLE = 3.0
 
 _POLL = 0.02
 _KNOTS_PER_MESSAGE = 48
+_TOGETHER = 8
 OVER_MAX = 60.0
 
 
@@ -39,6 +40,7 @@ class AsyncSkin:
         self.layout = layout
         self.simulated = simulated
         self._telemetry = 0  # number of the newest telemetry iterator
+        link.on_open = self._opened
 
     @classmethod
     async def open(
@@ -57,6 +59,10 @@ class AsyncSkin:
         except BaseException:
             await link.close()
             raise
+
+    def _opened(self, reply: Received) -> None:
+        """A new session: the device may have restarted, with other tables or firmware."""
+        self.info = Info.of(reply)
 
     async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
         """See `Skin.show`."""
@@ -171,11 +177,14 @@ class AsyncSkin:
         if len(each) != n:
             raise InvalidInput(f"{len(each)} tables for {n} bubbles: give one per bubble, or one for all.")
         data = [table.to_bytes() for table in each]
+        parts = []
         for bubble, table in enumerate(data):
             knots = np.frombuffer(table, "<u2").reshape(-1, 2).tolist()
             for first in range(0, len(knots), _KNOTS_PER_MESSAGE):
                 part = knots[first : first + _KNOTS_PER_MESSAGE]
-                await self._link.call("TABLE_WRITE", (bubble, first, len(knots)), part)
+                parts.append(("TABLE_WRITE", (bubble, first, len(knots)), part))
+        for first in range(0, len(parts), _TOGETHER):  # each has as long as any other call
+            await self._link.calls(parts[first : first + _TOGETHER])
         crc = crc32(b"".join(data))
         reply = await self._link.call("TABLE_COMMIT", (crc,))
         if reply["tables_crc"] != crc:

@@ -7,7 +7,7 @@ over. A text takes 16 values. An unsigned 32-bit value above 2**31 - 1 stands in
 
 from array import array
 
-from bubble_protocol.messages import MESSAGES, TEXT
+from bubble_protocol.messages import FIRST_SIZES, MESSAGES, TEXT
 from bubble_protocol.portable import micropython, ptr8, ptr32
 
 
@@ -106,12 +106,17 @@ class Message:
         self._highs = _limits(fixed + repeated, 4, 0x7FFFFFFF)
         self.fixed_size = sum(kind & 15 for kind in self._fixed_kinds)
         self.stride = sum(kind & 15 for kind in self._repeated_kinds)
+        self.least = FIRST_SIZES.get(message_id, self.fixed_size)
 
     def count(self, size):
-        """Repetitions in a payload of `size` bytes, or -1 where no payload of this message has that size."""
-        rest = size - self.fixed_size
+        """Repetitions in a payload of `size` bytes, or -1 where no payload of this message has that size.
+
+        Without a repeated group it may be longer, by what a newer version has appended, and shorter, down to
+        `least`, by what this one has.
+        """
         if self.stride == 0:
-            return 0 if rest == 0 else -1
+            return 0 if size >= self.least else -1
+        rest = size - self.fixed_size
         if rest < 0 or rest % self.stride:
             return -1
         return rest // self.stride
@@ -124,8 +129,14 @@ class Message:
         return index
 
     def unpack(self, payload, index, size, values):
-        """Read `payload[index:index + size]` into `values`; returns the repetitions, -1 where the size is wrong."""
+        """Read `payload[index:index + size]` into `values`; returns the repetitions, -1 where the size is wrong.
+
+        Fields that an older version does not send are 0; `payload` gets zeros in their place.
+        """
         count = self.count(size)
+        while count >= 0 and size < self.fixed_size:
+            payload[index + size] = 0
+            size += 1
         if count >= 0:
             index = _unpack(self._fixed_kinds, values, payload, self.fixed_values, 1, 0, index)
         if count > 0:

@@ -4,6 +4,9 @@
     | 1      | 1  | 2        | 0..247  | 4      | 1    |
     | COBS   | id | sequence | payload | CRC-32 | 0x00 |
 
+The CRC is XORed with a key that both ends know, so that frames of another session are no frames here; those
+about HELLO are not, because they are how the key is agreed on.
+
 Nine bytes around a payload. The content (id to CRC) is at most 254 bytes, so a COBS block is never split
 and both directions work in place and touch only the zeros (Cheshire and Baker, 1999).
 
@@ -11,7 +14,7 @@ Nothing here allocates once made, reads a clock or does I/O. `crc32_into(buffer,
 the caller's: crcmod on the host, `bubble_protocol.crc` on the device.
 """
 
-from bubble_protocol.portable import micropython, ptr8
+from bubble_protocol.portable import const, micropython, ptr8
 
 HEADER = 3  # id, sequence number
 CRC = 4
@@ -20,13 +23,25 @@ PAYLOAD_MAX = CONTENT_MAX - HEADER - CRC
 FRAME_MAX = CONTENT_MAX + 2  # with the COBS byte and the delimiter
 OVERHEAD = FRAME_MAX - PAYLOAD_MAX
 
+NO_KEY = bytes(CRC)
+
 _ZERO = b"\x00"
+_HELLO = const(0x01)
+_HELLO_REPLY = const(0x81)
+_ERROR = const(0x7F)
 _SHORTEST = 1 + HEADER + CRC  # without the delimiter
 
 
 @micropython.viper
-def _stuff(frame: ptr8, end: int):
-    """Put the distance to the next zero in place of every zero of `frame[0:end]`; one stands at `end`."""
+def _stuff(frame: ptr8, end: int, key: ptr8):
+    """Mix the key into the CRC, then put the distance to the next zero in place of every zero of `frame[0:end]`."""
+    what = frame[1]
+    if not (what == _HELLO or what == _HELLO_REPLY or (what == _ERROR and frame[4] == _HELLO)):
+        frame[end - 4] ^= key[0]
+        frame[end - 3] ^= key[1]
+        frame[end - 2] ^= key[2]
+        frame[end - 1] ^= key[3]
+    frame[end] = 0
     at = 0
     i = 1
     while i <= end:
@@ -48,6 +63,25 @@ def _unstuff(frame: ptr8, used: int) -> int:
 
 
 @micropython.viper
+def _matches(frame: ptr8, at: int, crc: ptr8, key: ptr8) -> int:
+    """Whether `crc`, with the key where there is one, stands at `frame[at:]`."""
+    what = frame[1]
+    if what == _HELLO or what == _HELLO_REPLY or (what == _ERROR and frame[4] == _HELLO):
+        i = 0
+        while i < 4:
+            if frame[at + i] != crc[i]:
+                return 0
+            i += 1
+        return 1
+    i = 0
+    while i < 4:
+        if frame[at + i] != crc[i] ^ key[i]:
+            return 0
+        i += 1
+    return 1
+
+
+@micropython.viper
 def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
     """`target[at:] = source[start:end]`, without slices."""
     while start < end:
@@ -56,15 +90,14 @@ def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
         start += 1
 
 
-def seal(frame, length, crc32_into):
+def seal(frame, length, crc32_into, key=NO_KEY):
     """Finish the frame whose id, sequence number and payload stand at `frame[1:1 + length]`.
 
     `frame` is a bytearray of FRAME_MAX bytes. Returns the length of the finished frame, delimiter included.
     """
     end = 1 + length + CRC
     crc32_into(frame, 1, 1 + length, frame, 1 + length)
-    frame[end] = 0
-    _stuff(frame, end)
+    _stuff(frame, end, key)
     return end + 1
 
 
@@ -81,12 +114,13 @@ class Decoder:
     Call `feed` until it has taken all bytes. After each call `length` says whether a frame has just been
     completed: then its id stands in `message_id`, its sequence number in `sequence`, and `length` counts
     the bytes of id, sequence number and payload; the payload is `frame[PAYLOAD_AT:1 + length]`, valid until
-    the next `feed`. Otherwise `length` is 0. `good` and `bad` count frames.
+    the next `feed`. Otherwise `length` is 0. `good` and `bad` count frames. `key` may be changed at any time.
     """
 
     PAYLOAD_AT = 1 + HEADER
 
-    def __init__(self, crc32_into):
+    def __init__(self, crc32_into, key=NO_KEY):
+        self.key = key
         self.frame = bytearray(FRAME_MAX)
         self.length = 0
         self.good = 0
@@ -141,9 +175,4 @@ class Decoder:
         crc = self._crc
         crc_at = used - CRC
         self._crc32_into(frame, 1, crc_at, crc, 0)
-        return (
-            frame[crc_at] == crc[0]
-            and frame[crc_at + 1] == crc[1]
-            and frame[crc_at + 2] == crc[2]
-            and frame[crc_at + 3] == crc[3]
-        )
+        return _matches(frame, crc_at, crc, self.key)

@@ -19,7 +19,7 @@ ERROR = 0x7F
 
 # What ERROR says went wrong.
 UNKNOWN_MESSAGE, WRONG_LENGTH, OUT_OF_RANGE, WRONG_COUNT, BAD_TABLE, BAD_CRC, NO_COMMON_PROTOCOL, FAULTED = range(1, 9)
-BOARD_FAULT = 9
+BOARD_FAULT, OVERTAKEN = 9, 10
 ERRORS = (
     (UNKNOWN_MESSAGE, "unknown_message", "no message has this id"),
     (WRONG_LENGTH, "wrong_length", "the payload is too short or too long: asked bytes, low to high allowed"),
@@ -30,7 +30,12 @@ ERRORS = (
     (NO_COMMON_PROTOCOL, "no_common_protocol", "asked is the host's newest, low to high the device's"),
     (FAULTED, "faulted", "the device failed at this request and vents"),
     (BOARD_FAULT, "board_fault", "a fault of the board forbids it: asked are its bits; mend the cause, then CLEAR"),
+    (OVERTAKEN, "overtaken", "a later STOP, VENT or session came first: not applied, and never will be"),
 )
+
+# Bits of `capabilities`.
+DELIVERY = 1
+CAPABILITIES = ((DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),)
 
 # What the board as a whole is doing.
 VENTED, ACTIVE, HOLDING = range(3)
@@ -114,9 +119,10 @@ MESSAGES = (
         (
             ("protocol_min", U8, "", None, None, "oldest protocol the host speaks"),
             ("protocol_max", U8, "", None, None, "newest protocol the host speaks"),
+            ("session", U32, "", None, None, "any number but 0, another one for every session"),
         ),
         (),
-        "who is there?",
+        "who is there? Opens the session, where it is not open already",
     ),
     (
         HELLO | REPLY,
@@ -136,7 +142,7 @@ MESSAGES = (
             ("height_max_um", U16, "µm", None, None, "the greatest height that may be asked"),
             ("pressure_max_pa", U32, "Pa", None, None, "gauge pressure at which a bubble is vented"),
             ("window", U8, "requests", None, None, "requests that may be under way at once"),
-            ("capabilities", U32, "", None, None, "bits, none defined yet"),
+            ("capabilities", U32, "", None, None, "see capabilities, bits"),
             ("tables_crc", U32, "", None, None, "CRC-32 of the tables in use"),
         ),
         (),
@@ -315,3 +321,7 @@ MESSAGES = (
         "refused, nothing was changed; in place of the reply",
     ),
 )
+
+# Bytes of messages that have had fields appended, as the oldest version that is still understood sends them.
+# Fields that are missing count as 0. HELLO must be understood from every version, to be refused in a sentence.
+FIRST_SIZES = {HELLO: 2}

@@ -7,7 +7,11 @@ import pytest
 from bubble_firmware import boards
 from bubble_firmware.app import App
 from bubble_protocol import codec
+from bubble_protocol.messages import HELLO, PING
+from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.link import wire
+
+SESSION = 0x89ABCDEF
 
 
 class Hands:
@@ -86,6 +90,21 @@ class Rig:
         self.app = App(self.board, self.hands)
         self._reader = wire.Reader()
         self._sequence = 0
+        self.open(SESSION)
+
+    def open(self, session):
+        """Open a session, without a tick; the greeting."""
+        self.hands.to_device += wire.encode("HELLO", 0, (PROTOCOL_MIN, PROTOCOL_MAX, session))
+        self.app.session.poll()
+        self.session = session
+        self.key = wire.session_key(self.hands.boot_id, session)
+        self._reader.use(self.key)
+        self._sequence = 0
+        return self.heard()[-1]
+
+    def encode(self, name, sequence, fixed=(), repeated=()):
+        """A frame of the open session."""
+        return wire.encode(name, sequence, fixed, repeated, self.key)
 
     def tick(self, ticks=1):
         for _ in range(ticks):
@@ -97,14 +116,21 @@ class Rig:
         self.hands.from_device.clear()
         return messages
 
+    def next_sequence(self, message_id):
+        """The number of the next request; HELLO and PING are outside the order and take none."""
+        if message_id in (HELLO, PING):
+            return 0xF00D
+        self._sequence = (self._sequence + 1) & 0xFFFF
+        return self._sequence
+
     def ask(self, name, fixed=(), repeated=()):
         """Send a request, tick once; the one answer."""
-        self._sequence += 1
-        self.hands.to_device += wire.encode(name, self._sequence, fixed, repeated)
+        sequence = self.next_sequence(codec.BY_NAME[name].id)
+        self.hands.to_device += self.encode(name, sequence, fixed, repeated)
         self.heard()
         self.tick()
         (answer,) = self.heard()
-        assert answer.sequence == self._sequence
+        assert answer.sequence == sequence
         return answer
 
     def refused(self, name, fixed=(), repeated=()):

@@ -79,7 +79,7 @@ class Hands:
 class Watch:
     # Stands before the dispatcher and asks of every frame accepted whether it was sent.
     def __init__(self, session, sent):
-        self.handle = session._handle
+        self.handle = session._arrive
         self.frame = session._decoder.frame
         self.decoder = session._decoder
         self.sent = sent
@@ -87,12 +87,12 @@ class Watch:
         self.accepted = 0
         self.forged = 0
 
-    def __call__(self, message_id, size):
+    def __call__(self, message_id, sequence):
         self.accepted += 1
         content = bytes(self.frame[1 : 1 + self.decoder.length])
         if self.sent is not None and content not in self.sent:
             self.forged += 1
-        self.handle(message_id, size)
+        self.handle(message_id, sequence)
 
 
 rnd = random.getrandbits
@@ -101,7 +101,13 @@ app = App(boards.load("wristband7"), hands)
 session = app.session
 decoder = session._decoder
 frames = [bytes.fromhex(line) for line in sys.stdin.read().split()]
+greeting = frames.pop(0)
 good = frames[0]
+key = session._delivery.key
+for i in range(len(greeting)):
+    hands.line[i] = greeting[i]
+hands.length = len(greeting)
+app.tick()
 sent = set()
 for frame in frames:
     at = 0
@@ -109,7 +115,7 @@ for frame in frames:
         at = decoder.feed(frame, at, len(frame))
     sent.add(bytes(decoder.frame[1 : 1 + decoder.length]))
 watch = Watch(session, sent)
-session._handle = watch
+session._arrive = watch
 
 
 def run(length):
@@ -224,11 +230,14 @@ def well_formed(total):
         size = rnd(5) if rnd(1) else rnd(8) % 248
         if rnd(2) == 0:
             size = {right_size} if rnd(1) else 3 + 4 * rnd(4)
-        framing.put_header(frame, rnd(4) if rnd(3) else rnd(8), rnd(16))
+        framing.put_header(frame, rnd(4) if rnd(3) else rnd(8), session._delivery.expected)
         few = rnd(1)
         for i in range(size):
             frame[4 + i] = rnd(8) >> (5 if few else 0)
-        end = framing.seal(frame, framing.HEADER + size, crc32_into)
+        if frame[1] == 1:  # HELLO: of the session that is open, or of none
+            for i in range(4):
+                frame[6 + i] = 0xAB if size >= 6 and not few else 0
+        end = framing.seal(frame, framing.HEADER + size, crc32_into, key)
         line = hands.line
         for i in range(end):
             line[i] = frame[i]
@@ -262,10 +271,14 @@ main({seed}, {bytes}, {mutations}, {requests})
 """
 
 
+SESSION = 0xABABABAB
+
+
 def valid_frames():
-    """Every request and some replies, short and as long as they get; the first is the good one."""
+    """HELLO, then every request and some replies, short and as long as they get; the first is the good one."""
     chance = random.Random(5)
-    frames = [wire.encode("PING", 0x1234, (0x00C0FFEE,))]
+    key = wire.session_key(1, SESSION)
+    frames = [wire.encode("HELLO", 1, (2, 2, SESSION)), wire.encode("PING", 0x1234, (0x00C0FFEE,), key=key)]
     for message in codec.BY_ID.values():
         room = (framing.PAYLOAD_MAX - message.fixed_size) // message.stride if message.stride else 0
         for count in {0, min(7, room), room}:
@@ -273,7 +286,9 @@ def valid_frames():
             frame = bytearray(framing.FRAME_MAX)
             framing.put_header(frame, message.id, chance.randrange(1 << 16))
             frame[4 : 4 + size] = bytes(chance.choice([0, 1, chance.randrange(256)]) for _ in range(size))
-            frames.append(bytes(frame[: framing.seal(frame, framing.HEADER + size, crc32_into)]))
+            if message.id == messages.HELLO:  # which must not open another session
+                frame[4 : 4 + size] = bytes([0, 2, 0xAB, 0xAB, 0xAB, 0xAB])
+            frames.append(bytes(frame[: framing.seal(frame, framing.HEADER + size, crc32_into, key)]))
     return frames
 
 
@@ -313,12 +328,13 @@ def test_every_well_formed_frame_is_answered_once(rig):
     frame = bytearray(framing.FRAME_MAX)
     for _ in range(2000):
         size = chance.choice([*fitting, chance.randrange(248)])
-        framing.put_header(
-            frame, chance.choice([chance.randrange(16), chance.randrange(256)]), chance.randrange(1 << 16)
-        )
+        message_id = chance.choice([chance.randrange(16), chance.randrange(256)])
+        framing.put_header(frame, message_id, rig.app.session._delivery.expected)
         largest = chance.choice([8, 64, 256])
         frame[4 : 4 + size] = bytes(chance.randrange(largest) for _ in range(size))
-        rig.hands.to_device += frame[: framing.seal(frame, framing.HEADER + size, crc32_into)]
+        if message_id == messages.HELLO:  # which must not open another session
+            frame[6:10] = rig.session.to_bytes(4, "little") if size >= 6 else bytes(4)
+        rig.hands.to_device += frame[: framing.seal(frame, framing.HEADER + size, crc32_into, rig.key)]
         rig.tick(2)
         answers = [message for message in rig.heard() if message.id != messages.TELEMETRY]
         assert len(answers) == 1

@@ -1,5 +1,6 @@
 """The same readings and the same bytes of the link give the same commands, bit for bit, here and on MicroPython."""
 
+import itertools
 import random
 import zlib
 from array import array
@@ -35,8 +36,23 @@ class Recorder:
         self.firmware.close()
 
 
-def show(sequence, over_ms, heights):
-    return wire.encode("SHOW", sequence, (over_ms,), [(height,) for height in heights])
+PONG = messages.PING | messages.REPLY
+KEY = wire.session_key(BOOT_ID, 1)
+
+
+class Host:
+    """Frames of one session, numbered as they come."""
+
+    def __init__(self):
+        self.hello = b"\xff\0" + wire.encode("HELLO", 1, (2, 2, 1))
+        self.numbers = itertools.count(1)
+
+    def ask(self, name, fixed=(), repeated=()):
+        number = 77 if name == "PING" else next(self.numbers)  # which is outside the order
+        return wire.encode(name, number, fixed, repeated, KEY)
+
+    def show(self, over_ms, heights):
+        return self.ask("SHOW", (over_ms,), [(height,) for height in heights])
 
 
 def script(n):
@@ -50,25 +66,27 @@ def script(n):
     tables = zlib.crc32(
         b"".join(np.array(table, "<u2").tobytes() for table in [KNOTS, snaps_through, *[KNOTS] * (n - 2)])
     )
+    host = Host()
+    ask = host.ask
     return [
-        (0.00, b"\xff\x00" + wire.encode("HELLO", 1, (1, 1)) + wire.encode("SUBSCRIBE", 2, (4,))),
-        (0.05, show(3, 0, shape(5500, 12500))),
-        (1.00, wire.encode("STATE", 4) + wire.encode("PING", 5, (0xFEDCBA98,))),
-        (1.20, show(6, 500, shape(7000, 9000))),
-        (2.40, show(7, 0, shape(9000, 14000))),
-        (3.20, wire.encode("STOP", 8)),
-        (3.70, show(9, 0, [5000, *shape(6000, 9500)[1:]])),
-        (4.40, b"\x07garbage\x00" + wire.encode("PING", 10, (1,))[:-3]),
+        (0.00, host.hello + ask("SUBSCRIBE", (4,))),
+        (0.05, host.show(0, shape(5500, 12500))),
+        (1.00, ask("STATE") + ask("PING", (0xFEDCBA98,))),
+        (1.20, host.show(500, shape(7000, 9000))),
+        (2.40, host.show(0, shape(9000, 14000))),
+        (3.20, ask("STOP")),
+        (3.70, host.show(0, [5000, *shape(6000, 9500)[1:]])),
+        (4.40, b"\x07garbage\x00" + ask("PING", (1,))[:-3]),
         (
             4.50,
-            b"\0" + wire.encode("TABLE_WRITE", 11, (1, 0, 5), snaps_through) + wire.encode("TABLE_COMMIT", 12, (123,)),
+            b"\0" + ask("TABLE_WRITE", (1, 0, 5), snaps_through) + ask("TABLE_COMMIT", (123,)),
         ),
-        (4.60, wire.encode("TABLE_COMMIT", 13, (tables,)) + wire.encode("TABLE_READ", 14, (1, 0))),
-        (4.90, wire.encode("VENT", 15)),
-        (5.50, show(16, 0, [15000] * n) + show(17, 0, [9000] * (n - 1))),
-        (5.60, show(18, 1000, shape(10000, 14000))),
-        (8.00, wire.encode("CLEAR", 19) + show(20, 0, shape(5000, 14000))),
-        (9.50, show(21, 60000, [0] * n)),
+        (4.60, ask("TABLE_COMMIT", (tables,)) + ask("TABLE_READ", (1, 0))),
+        (4.90, ask("VENT")),
+        (5.50, host.show(0, [15000] * n) + host.show(0, [9000] * (n - 1))),
+        (5.60, host.show(1000, shape(10000, 14000))),
+        (8.00, ask("CLEAR") + host.show(0, shape(5000, 14000))),
+        (9.50, host.show(60000, [0] * n)),
     ]
 
 
@@ -117,9 +135,10 @@ def test_a_recorded_trace_replays_bit_for_bit(trace):
     assert_same(decided, replay(MicroPythonFirmware(data, BOOT_ID), given))
 
     # The trace is one that says something: every answer, both kinds of valves on every bubble, faults.
-    heard = list(wire.Reader().feed(b"".join(outputs.link for outputs in decided)))
+    heard = list(wire.Reader(KEY).feed(b"".join(outputs.link for outputs in decided)))
     telemetry = [message for message in heard if message.id == messages.TELEMETRY]
-    assert {message.sequence for message in heard if message.id != messages.TELEMETRY} == set(range(1, 22)) - {10}
+    answers = [message.sequence for message in heard if message.id not in (messages.TELEMETRY, PONG)]
+    assert answers == [1, *range(1, 19)], "HELLO, then every request, each once"
     assert len(telemetry) > 10_000_000 // data.TICK_US // 4 - 5
     pulses = np.array([outputs.pulses for outputs in decided]).reshape(len(decided), -1, 2)
     doses = (pulses > 0) & (pulses < data.TICK_US)
@@ -134,11 +153,13 @@ def hostile(seed, board, ticks):
     chance = random.Random(seed)
     n = board.BUBBLES
     tables = [list(KNOTS)] * n
+    host = Host()
+    ask = host.ask
     for tick in range(ticks):
         if tick % 30 == 0:
             base = [chance.choice([0, 160, 1400, 2630, 4095, chance.randrange(4096)]) for _ in range(n + 1)]
             noise = chance.choice([1, 5, 60, 600])
-        link = b""
+        link = b"" if tick else host.hello
         if tick % 100 == 0:
             bubble = chance.randrange(n)
             heights = sorted(chance.sample(range(1, 14000), chance.randrange(1, 50)))
@@ -146,15 +167,15 @@ def hostile(seed, board, ticks):
             tables[bubble] = [
                 (height, chance.choice([0, 42000, chance.randrange(42001)])) for height in [*heights, last]
             ]
-            link = wire.encode("TABLE_WRITE", tick, (bubble, 0, len(tables[bubble])), tables[bubble])
+            link += ask("TABLE_WRITE", (bubble, 0, len(tables[bubble])), tables[bubble])
         elif tick % 100 == 1:
             crc = zlib.crc32(b"".join(np.array(table, "<u2").tobytes() for table in tables))
-            link = wire.encode("TABLE_COMMIT", tick, (crc,))
+            link = ask("TABLE_COMMIT", (crc,))
         elif tick % 40 == 2:
             over_ms = chance.choice([0, 200, chance.randrange(60001)])
-            link = wire.encode("CLEAR", tick) + show(tick, over_ms, [chance.randrange(14001) for _ in range(n)])
+            link = ask("CLEAR") + host.show(over_ms, [chance.randrange(14001) for _ in range(n)])
         elif tick % 100 == 50:
-            link = wire.encode(chance.choice(["STOP", "VENT", "STATE"]), tick)
+            link = ask(chance.choice(["STOP", "VENT", "STATE"]))
         counts = [max(0, min(4095, level + chance.randint(-noise, noise))) for level in base]
         yield array("H", counts), link
 
@@ -166,6 +187,6 @@ def test_what_no_plant_would_do_is_computed_the_same(seed):
     given = list(hostile(seed, data, 2000))
     decided = replay(InProcessFirmware(data, BOOT_ID), given)
     assert_same(decided, replay(MicroPythonFirmware(data, BOOT_ID), given))
-    heard = list(wire.Reader().feed(b"".join(outputs.link for outputs in decided)))
+    heard = list(wire.Reader(KEY).feed(b"".join(outputs.link for outputs in decided)))
     assert not [message for message in heard if message.id == messages.ERROR]
     assert len({tuple(outputs.pulses) for outputs in decided}) > 100

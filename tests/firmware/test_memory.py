@@ -3,6 +3,8 @@
 import pytest
 
 from bubble_firmware import boards
+from bubble_protocol import framing, messages
+from bubble_protocol.crc import crc32_into
 from bubbleskin.link import wire
 
 SCRIPT = """
@@ -124,39 +126,71 @@ print(measure(app, hands), app.exceptions - exceptions, hands.safe)
 """
 
 ACTIVE = ("SUBSCRIBE", "SHOW up", "STATE", "PING", "INFO", "SHOW down", "PING", "STATE", "INFO")
+OUT_OF_ORDER = ("SUBSCRIBE", "SHOW up", "STATE", "INFO", "SHOW down", "STATE", "STOP ahead", "STATE")
 SEQUENCES = [
     pytest.param(ACTIVE, id="active"),
     pytest.param(("SHOW up", "HELLO", "STOP", "SHOW down", "VENT", "CLEAR", "TABLE_READ"), id="everything"),
     pytest.param(("SHOW up", "garbage", "too high", "wrong count", "wrong length", "unknown"), id="refused"),
     pytest.param(("TABLE_WRITE", "SHOW up", "STATE"), id="tables"),
+    pytest.param(OUT_OF_ORDER, id="out of order, twice, overtaken"),
 ]
+SESSIONS = 17
+"""One more than the device remembers: the first may come again after the last."""
 
 
-def request(name, n):
+def request(name, n, number, session):
+    key = wire.session_key(1, session)
     up = [(6000 + 900 * bubble % 8000,) for bubble in range(n)]
     down = [(13000 - 700 * bubble % 8000,) for bubble in range(n)]
+
+    def of(what, *values):
+        return wire.encode(what, number, *values, key=key)
+
+    def wrong_length():
+        frame = bytearray(framing.FRAME_MAX)
+        framing.put_header(frame, messages.SUBSCRIBE, number)
+        return bytes(frame[: framing.seal(frame, framing.HEADER + 1, crc32_into, key)])
+
     requests = {
-        "SHOW up": lambda: wire.encode("SHOW", 1, (0,), up),
-        "SHOW down": lambda: wire.encode("SHOW", 2, (300,), down),
-        "PING": lambda: wire.encode("PING", 3, (0xFEDCBA98,)),
-        "HELLO": lambda: wire.encode("HELLO", 4, (1, 1)),
-        "SUBSCRIBE": lambda: wire.encode("SUBSCRIBE", 5, (20000 // boards.load(f"wristband{n}").TICK_US,)),  # 50 Hz
-        "TABLE_READ": lambda: wire.encode("TABLE_READ", 6, (1, 10)),
-        "TABLE_WRITE": lambda: wire.encode("TABLE_WRITE", 7, (1, 4, 60), [(9000, 65535)] * 40),
+        "SHOW up": lambda: of("SHOW", (0,), up),
+        "SHOW down": lambda: of("SHOW", (300,), down),
+        "PING": lambda: of("PING", (0xFEDCBA98,)),
+        "HELLO": lambda: of("HELLO", (2, 2, session)),
+        "SUBSCRIBE": lambda: of("SUBSCRIBE", (20000 // boards.load(f"wristband{n}").TICK_US,)),  # 50 Hz
+        "TABLE_READ": lambda: of("TABLE_READ", (1, 10)),
+        "TABLE_WRITE": lambda: of("TABLE_WRITE", (1, 4, 60), [(9000, 65535)] * 40),
         "garbage": lambda: bytes(range(1, 200)) + b"\0",
-        "too high": lambda: wire.encode("SHOW", 8, (0,), [(15000,)] * n),
-        "wrong count": lambda: wire.encode("SHOW", 9, (0,), [(9000,)] * (n + 1)),
-        "wrong length": lambda: wire.encode("HELLO", 10, (1, 1))[:-1] + b"\x01\0",
-        "unknown": lambda: wire.encode("PING_REPLY", 11, (0xFEDCBA98, 1, 1)),
+        "too high": lambda: of("SHOW", (0,), [(15000,)] * n),
+        "wrong count": lambda: of("SHOW", (0,), [(9000,)] * (n + 1)),
+        "wrong length": wrong_length,
+        "unknown": lambda: of("PING_REPLY", (0xFEDCBA98, 1, 1)),
     }
-    return requests[name]() if name in requests else wire.encode(name, 12)
+    return requests[name]() if name in requests else of(name)
+
+
+def rounds(sequence, n):
+    """The requests in session after session, over and over: one session's numbers do not come round in so short a time."""
+    for session in range(0x89ABCDEF, 0x89ABCDEF + SESSIONS):
+        yield request("HELLO", n, 1, session)
+        number, frames = 0, []
+        for name in sequence:
+            number += name not in ("HELLO", "PING", "garbage")
+            if name == "STOP ahead":
+                number += 2
+                frames.append(request("STOP", n, number, session))
+                frames.append(request("STATE", n, number - 1, session))
+            else:
+                frames.append(request(name, n, number, session))
+        if sequence == OUT_OF_ORDER:
+            frames = [frames[at] for at in (0, 4, 1, 3, 2, 1, 5, 6, 6, 7, 5, 8, 0)]
+        yield b"".join(frames)
 
 
 @pytest.mark.parametrize("sequence", SEQUENCES)
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])
 def test_the_tick_allocates_nothing(micropython, board, sequence):
     n = boards.load(board).BUBBLES
-    requests = b"".join(request(name, n) for name in sequence)
+    requests = b"".join(rounds(sequence, n))
     said, failing = micropython(
         SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=17, ticks=4000)
     ).splitlines()

@@ -17,13 +17,14 @@ STEEPER = [(5000, 0), (8000, 20000), (14000, 40000)]
 def raw(rig, message_id, payload):
     """Send any payload under any id; the answer's (error, field, element, asked, low, high)."""
     frame = bytearray(framing.FRAME_MAX)
-    framing.put_header(frame, message_id, 77)
+    sequence = rig.next_sequence(message_id)
+    framing.put_header(frame, message_id, sequence)
     frame[4 : 4 + len(payload)] = payload
-    rig.hands.to_device += bytes(frame[: framing.seal(frame, framing.HEADER + len(payload), crc32_into)])
+    rig.hands.to_device += bytes(frame[: framing.seal(frame, framing.HEADER + len(payload), crc32_into, rig.key)])
     rig.heard()
     rig.tick()
     (answer,) = rig.heard()
-    assert (answer.id, answer.sequence, answer["request"]) == (messages.ERROR, 77, message_id)
+    assert (answer.id, answer.sequence, answer["request"]) == (messages.ERROR, sequence, message_id)
     return tuple(answer[field] for field in ("error", "field", "element", "asked", "low", "high"))
 
 
@@ -87,15 +88,15 @@ def test_an_unknown_message_is_refused(rig):
 def test_a_payload_of_the_wrong_length_is_refused(rig):
     for message in codec.BY_ID.values():
         if message.id | messages.REPLY in codec.BY_ID and message.id < messages.REPLY:
-            low = message.fixed_size
-            high = framing.PAYLOAD_MAX if message.stride else low
-            wrong = {low - 1, low + 1, 247} - {-1} if not message.stride else {low - 1, low + 1}
-            for size in wrong:
+            low = message.least
+            high = framing.PAYLOAD_MAX
+            wrong = {low - 1, low + 1} if message.stride else {0, low - 1}
+            for size in wrong & set(range(low)) | wrong & {low + 1}:
                 assert raw(rig, message.id, bytes(size)) == (messages.WRONG_LENGTH, 0, WHOLE, size, low, high)
 
 
 def test_hello_introduces_the_board(rig):
-    reply = rig.ask("HELLO", (version.PROTOCOL_MIN, version.PROTOCOL_MAX))
+    reply = rig.ask("HELLO", (version.PROTOCOL_MIN, version.PROTOCOL_MAX, 7))
     board = rig.board
     assert reply.fields == {
         "protocol_min": version.PROTOCOL_MIN,
@@ -111,18 +112,18 @@ def test_hello_introduces_the_board(rig):
         "height_rest_um": board.HEIGHT_REST_UM,
         "height_max_um": board.HEIGHT_MAX_UM,
         "pressure_max_pa": board.PRESSURE_MAX_PA,
-        "window": 1,
-        "capabilities": 0,
+        "window": 8,
+        "capabilities": messages.DELIVERY,
         "tables_crc": zlib.crc32(np.array(nominal.KNOTS, "<u2").tobytes() * board.BUBBLES),
     }
 
 
 def test_a_host_of_another_protocol_is_refused(rig7):
     low, high = version.PROTOCOL_MIN, version.PROTOCOL_MAX
-    newer, older = (high + 1, high + 5), (0, low - 1)
+    newer, older = (high + 1, high + 5, 7), (0, low - 1, 7)
     assert rig7.refused("HELLO", newer) == (messages.NO_COMMON_PROTOCOL, 1, WHOLE, high + 5, low, high)
     assert rig7.refused("HELLO", older) == (messages.NO_COMMON_PROTOCOL, 1, WHOLE, low - 1, low, high)
-    assert rig7.ask("HELLO", (0, 255)).id == messages.HELLO | messages.REPLY
+    assert rig7.ask("HELLO", (0, 255, 7)).id == messages.HELLO | messages.REPLY
 
 
 def test_ping_gives_token_and_time_back(rig7):
@@ -132,16 +133,16 @@ def test_ping_gives_token_and_time_back(rig7):
 
 
 def test_info_counts(rig7):
-    rig7.hands.to_device += b"\x05abcd\0" + wire.encode("PING", 1, (1,))
+    rig7.hands.to_device += b"\x05abcd\0" + rig7.encode("PING", 1, (1,)) + wire.encode("PING", 1, (1,))
     rig7.tick()
     info = rig7.ask("INFO")
-    assert (info["frames_good"], info["frames_bad"], info["exceptions"]) == (2, 1, 0)
+    assert (info["frames_good"], info["frames_bad"], info["exceptions"]) == (3, 2, 0), "without the key it is no frame"
     assert info["supply_pa"] == rig7.board.SUPPLY_PA
     assert info["tables_crc"] == zlib.crc32(np.array(nominal.KNOTS, "<u2").tobytes() * 7)
 
 
 def test_several_requests_in_one_tick_are_answered_in_order(rig7):
-    rig7.hands.to_device += b"".join(wire.encode("PING", sequence, (sequence,)) for sequence in range(5))
+    rig7.hands.to_device += b"".join(rig7.encode("PING", sequence, (sequence,)) for sequence in range(5))
     rig7.tick()
     assert [reply["token"] for reply in rig7.heard()] == list(range(5))
 
@@ -175,7 +176,7 @@ def test_telemetry_comes_in_its_period_and_counts_what_was_due(rig7):
 
 def test_a_new_host_has_not_subscribed(rig7):
     rig7.ask("SUBSCRIBE", (60,))
-    rig7.ask("HELLO", (1, 1))
+    rig7.open(99)
     rig7.tick(200)
     assert rig7.heard() == []
 

@@ -5,7 +5,6 @@ import random
 import pytest
 
 from bubble_protocol import messages
-from bubbleskin.link import wire
 
 WRONG_READINGS = 2  # in a row that make a fault; one alone is noise
 HELD_PA, HELD_UM = 22609, 10008  # a knot of the nominal table
@@ -134,14 +133,15 @@ def test_no_fill_valve_is_ever_open_for_longer_than_allowed(rig7, seed):
     """Sensors that lie at random, at times for seconds: the limit holds, and no tick fails."""
     board = rig7.board
     chance = random.Random(seed)
+    number = 1
     stretch = [0] * board.BUBBLES
     for tick in range(3000):
         if tick % 200 == 0:
             heights = [chance.choice([5000, 8000, 14000, chance.randrange(14001)]) for _ in range(board.BUBBLES)]
-            rig7.hands.to_device += wire.encode(
-                "SHOW", 1, (chance.choice([0, 0, 500]),), [(height,) for height in heights]
-            )
-            rig7.hands.to_device += wire.encode("CLEAR", 2)
+            over_ms = chance.choice([0, 0, 500])
+            rig7.hands.to_device += rig7.encode("SHOW", number, (over_ms,), [(height,) for height in heights])
+            rig7.hands.to_device += rig7.encode("CLEAR", number + 1)
+            number += 2
             rig7.hands.counts[-1] = chance.choice([160, 500, 2560, 4000])
         if tick % 50 == 0:
             for bubble in range(board.BUBBLES):
@@ -252,7 +252,7 @@ def test_the_outputs_are_safe_before_anything_else_is_tried(rig7, monkeypatch):
 def test_a_broken_link_does_not_stop_the_tick(rig7, hand):
     hold(rig7)
     rig7.hands.broken.add(hand)
-    rig7.hands.to_device += bytes.fromhex("020201010101010557cef30a00")  # PING, see golden.json
+    rig7.hands.to_device += rig7.encode("PING", 1, (1,))
     rig7.tick(5)
     rig7.hands.broken.clear()
     rig7.hands.to_device = b""

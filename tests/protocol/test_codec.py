@@ -65,7 +65,11 @@ def test_pack_and_unpack_are_structs(message, data):
 
 @every_message
 def test_a_payload_of_another_size_is_refused_and_not_read(message):
+    """Another size than an older version's, this one's or a newer one's."""
     sizes = {struct.calcsize(layout(message, count)): count for count in range(room(message) + 1)}
+    if not message.repeated:
+        first = messages.FIRST_SIZES.get(message.id, min(sizes))
+        sizes = dict.fromkeys(range(first, PAYLOAD_MAX + 1), 0)
     assert max(sizes) <= PAYLOAD_MAX
     payload = bytearray(PAYLOAD_MAX)
     untouched = array("i", [7] * PAYLOAD_MAX)
@@ -75,6 +79,26 @@ def test_a_payload_of_another_size_is_refused_and_not_read(message):
             assert message.unpack(payload, 0, size, values) == -1
             assert values == untouched
         assert message.count(size) == sizes.get(size, -1)
+
+
+@every_message
+def test_fields_that_a_newer_version_has_appended_are_not_read(message):
+    if message.repeated:
+        return
+    payload = bytearray(range(message.fixed_size)) + bytearray(b"\xff" * (PAYLOAD_MAX - message.fixed_size))
+    values = array("i", [7] * PAYLOAD_MAX)
+    assert message.unpack(payload, 0, PAYLOAD_MAX, values) == 0
+    exact = array("i", [7] * PAYLOAD_MAX)
+    assert message.unpack(payload, 0, message.fixed_size, exact) == 0
+    assert values == exact
+
+
+def test_fields_that_an_older_version_does_not_send_are_zero():
+    """HELLO had no session in protocol 1. What stands behind the payload is not taken for it."""
+    hello = codec.BY_NAME["HELLO"]
+    values = array("i", [7] * hello.fixed_values)
+    assert hello.unpack(bytearray(b"\x01\x01\xff\xff\xff\xff"), 0, 2, values) == 0
+    assert values.tolist() == [1, 1, 0]
 
 
 def test_what_decides_the_bytes_decides_the_schemas_crc(monkeypatch):

@@ -2,7 +2,8 @@
 
 import pytest
 
-from bubble_firmware import boards, session
+from bubble_firmware import boards
+from bubble_firmware.requests import _KNOTS_PER_MESSAGE
 from bubble_protocol import codec, messages
 from bubble_protocol.framing import PAYLOAD_MAX
 from bubble_protocol.messages import I32, MESSAGES, REPLY, TEXT, U8, U16, U32
@@ -84,7 +85,7 @@ def test_a_frame_has_room_for_every_bubble(name, entries):
     message = codec.BY_NAME[name]
     assert message.fixed_size + entries * message.stride <= PAYLOAD_MAX
     assert max(boards.load(board).BUBBLES for board in BOARDS) <= BUBBLES
-    assert session._KNOTS_PER_MESSAGE == 48
+    assert _KNOTS_PER_MESSAGE == 48
 
 
 def test_every_message_fits_a_frame():

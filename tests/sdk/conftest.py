@@ -6,8 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
+from bubble_protocol import framing, messages
+from bubble_protocol.crc import crc32_into
+from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.link.session import drive
-from bubbleskin.link.wire import Reader
+from bubbleskin.link.wire import Reader, encode, session_key
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
 from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve
 from bubbleskin.skin import AsyncSkin, Skin
@@ -87,8 +90,34 @@ def served_port(port):
     served.stop()
 
 
+BOOT_ID = 2
+
+
+def greeting(request, low=PROTOCOL_MIN, high=PROTOCOL_MAX, board=b"wristband7", bubbles=7, window=8):
+    """The reply to HELLO of a device that speaks protocols `low` to `high`."""
+    name = list(board.ljust(16, b"\0"))
+    values = (low, high, 1, BOOT_ID, 0, 1, 0, *name, bubbles, 5000, 5000, 14000, 42000, window, 0, 3)
+    return encode("HELLO_REPLY", request.sequence, values)
+
+
+def rekeyed(data, key):
+    """Frames without a key, with this one."""
+    decoder = framing.Decoder(crc32_into)
+    out = b""
+    at = 0
+    while at < len(data):
+        at = decoder.feed(data, at, len(data))
+        if decoder.length:
+            frame = decoder.frame
+            out += bytes(frame[: framing.seal(frame, decoder.length, crc32_into, key)])
+    return out
+
+
 class Scripted:
-    """A transport to a device that is a function: `answer(request)` gives the bytes it sends. Time is virtual."""
+    """A transport to a device that is a function: `answer(request)` gives the bytes it sends, without the session's key.
+
+    HELLO is answered here, unless `answer` does. `requests` has no PINGs that keep the link alive. Time is virtual.
+    """
 
     blocks = False
 
@@ -98,13 +127,22 @@ class Scripted:
         self.closed = False
         self._answer = answer
         self._reader = Reader()
+        self._key = framing.NO_KEY
         self._out = b""
         self._now = 0.0
 
     def write(self, data):
         for request in self._reader.feed(data):
+            if request.id == messages.HELLO:
+                self._key = session_key(BOOT_ID, request["session"])
+                self._reader.use(self._key)
+            if request.id == messages.PING and request["token"] == 0:
+                continue
             self.requests.append(request)
-            self._out += self._answer(request)
+            answer = self._answer(request)
+            if request.id == messages.HELLO and not answer:
+                answer = greeting(request)
+            self._out += rekeyed(answer, self._key)
 
     def read(self, timeout):
         out, self._out = self._out, b""
@@ -119,6 +157,12 @@ class Scripted:
 
 
 @pytest.fixture
+def hello():
+    """`greeting`, for devices that are functions."""
+    return greeting
+
+
+@pytest.fixture
 def scripted():
     """`scripted(answer)`: a `Scripted` transport."""
     return Scripted
@@ -128,6 +172,7 @@ class Tap:
     """A transport on top of another: keeps what passes, and `change(data)` may change it on its way from the device."""
 
     blocks = False
+    skin = None
 
     def __init__(self, transport, change=lambda data: data, change_sent=lambda data: data):
         self.name = transport.name
@@ -146,6 +191,11 @@ class Tap:
         self.sent += data
         self._transport.write(self._change_sent(data))
 
+    def understood(self, data):
+        """The messages of the open session in `data`, but for the PINGs that keep the link alive and their replies."""
+        reader = Reader(self.skin._skin._link._window.key)
+        return [message for message in reader.feed(bytes(data)) if message.id & 0x7F != messages.PING]
+
     def now(self):
         return self._transport.now()
 
@@ -162,7 +212,8 @@ def tapped():
         simulated = SimulatedBoard(board, seed=seed, spread=spread, contact=False)
         boards.append(simulated)
         tap = Tap(SimulatedTransport(simulated, board), **changes)
-        return Skin(drive(AsyncSkin.open(tap, timeout, simulated=simulated))), tap
+        tap.skin = Skin(drive(AsyncSkin.open(tap, timeout, simulated=simulated)))
+        return tap.skin, tap
 
     yield make
     for board in boards:

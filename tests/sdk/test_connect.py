@@ -15,6 +15,7 @@ import serial.rfc2217
 from serial.tools import list_ports
 
 import bubbleskin as bs
+from bubble_protocol import messages, version
 from bubble_protocol.framing import FRAME_MAX
 from bubbleskin.link.session import drive
 from bubbleskin.link.transport import USB_IDS
@@ -207,36 +208,40 @@ def test_a_wristband_behind_some_noise_is_found(port, served_port):
         assert skin.info.bubbles == 7
 
 
-def hello(low, high, board=b"wristband7", bubbles=7):
-    name = list(board.ljust(16, b"\0"))
-    values = (low, high, 1, 2, 0, 1, 0, *name, bubbles, 5000, 5000, 14000, 42000, 1, 0, 3)
-    return lambda request: encode("HELLO_REPLY", request.sequence, values)
-
-
 def no_common(low, high):
     return lambda request: encode("ERROR", request.sequence, (1, 7, 1, 255, 1, low, high))
+
+
+def of_protocol_1(request):
+    """It does not know of sessions, and finds HELLO too long."""
+    return encode("ERROR", request.sequence, (1, messages.WRONG_LENGTH, 0, 255, 6, 2, 2))
+
+
+NOW = version.PROTOCOL_MAX
 
 
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        (hello(2, 2), ["speaks protocol 2", "at most 1", "pip install --upgrade bubbleskin"]),
-        (hello(2, 4), ["speaks protocols 2 to 4", "pip install --upgrade bubbleskin"]),
-        (hello(0, 0), ["speaks protocol 0", "1 and newer", "update the wristband's firmware"]),
-        (no_common(3, 5), ["speaks protocols 3 to 5", "pip install --upgrade bubbleskin"]),
-        (no_common(0, 0), ["speaks protocol 0", "update the wristband's firmware"]),
-        (hello(1, 1, bubbles=8), ["calls itself wristband7", "reports 8"]),
+        ({"low": NOW + 1, "high": NOW + 1}, [f"speaks protocol {NOW + 1}", f"at most {NOW}", "pip install --upgrade"]),
+        ({"low": NOW + 1, "high": NOW + 3}, [f"speaks protocols {NOW + 1} to {NOW + 3}", "pip install --upgrade"]),
+        ({"low": 1, "high": 1}, ["speaks protocol 1", "2 and newer", "update the wristband's firmware"]),
+        (of_protocol_1, ["speaks protocol 1", "2 and newer", "update the wristband's firmware"]),
+        (no_common(NOW + 1, NOW + 3), [f"speaks protocols {NOW + 1} to {NOW + 3}", "pip install --upgrade bubbleskin"]),
+        (no_common(1, 1), ["speaks protocol 1", "update the wristband's firmware"]),
+        ({"bubbles": 8}, ["calls itself wristband7", "reports 8"]),
     ],
 )
-def test_a_version_or_a_board_that_does_not_fit(scripted, answer, words):
-    transport = scripted(answer)
+def test_a_version_or_a_board_that_does_not_fit(scripted, hello, answer, words):
+    transport = scripted(answer if callable(answer) else lambda request: hello(request, **answer))
     fails(bs.WrongDevice, *words, act=lambda: drive(AsyncSkin.open(transport, 2.0)))
     assert transport.closed
     assert len(transport.requests) == 1
 
 
-def test_versions_that_overlap_fit(scripted):
-    assert drive(AsyncSkin.open(scripted(hello(0, 9)), 2.0)).info.protocol == (0, 9)
+def test_versions_that_overlap_fit(scripted, hello):
+    transport = scripted(lambda request: hello(request, 0, 9))
+    assert drive(AsyncSkin.open(transport, 2.0)).info.protocol == (0, 9)
 
 
 def test_a_version_mismatch_over_a_real_port(behaving):

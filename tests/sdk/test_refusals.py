@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubble_protocol import messages
+from bubble_protocol import messages, version
+from bubbleskin.link import wire
 from bubbleskin.link.session import drive
 
 pytestmark = pytest.mark.timeout(60)
@@ -127,8 +128,12 @@ def test_what_only_a_device_says(skin, name):
 
 
 def test_a_host_that_speaks_no_common_protocol(skin):
-    with pytest.raises(bs.WrongDevice, match="speaks protocol 1"):
-        call(skin, "HELLO", (2, 9))
+    transport = skin._skin._link.transport
+    newest = version.PROTOCOL_MAX
+    transport.write(wire.encode("HELLO", 999, (newest + 1, newest + 9, 1)))
+    (answer,) = wire.Reader().feed(transport.read(0.1))
+    assert (answer.id, answer.sequence, answer["request"]) == (messages.ERROR, 999, messages.HELLO)
+    assert (answer["error"], answer["low"], answer["high"]) == (messages.NO_COMMON_PROTOCOL, newest, newest)
 
 
 def test_a_height_of_zero_is_no_mistake(skin):

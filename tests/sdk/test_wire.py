@@ -30,8 +30,8 @@ def text16(text):
 
 
 HELLO = (
-    1,
-    1,
+    2,
+    2,
     wire.SCHEMA_CRC,
     0xFFFFFFFE,
     0,
@@ -70,7 +70,7 @@ def test_text_arrives_as_text():
 def test_info_health_and_state_are_in_the_units_of_their_names():
     (hello,) = receive(wire.encode("HELLO_REPLY", 1, HELLO))
     info = Info.of(hello)
-    assert (info.board, info.bubbles, info.firmware, info.protocol) == ("wristband7", 7, "0.1.7", (1, 1))
+    assert (info.board, info.bubbles, info.firmware, info.protocol) == ("wristband7", 7, "0.1.7", (2, 2))
     assert info.same_schema
     assert (info.tick, info.height_rest_mm, info.height_max_mm, info.pressure_max_kpa) == (0.005, 5.0, 14.0, 42.0)
     counters = (400, 3, 1000, 1, 17, 2, 5, 123456, 59990, 0xDEADBEEF, messages.HOLDING)
@@ -169,6 +169,10 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
             "The wristband refused SHOW: the emergency stop is pressed, or its loop is broken: everything vents. "
             "Mend the cause, then `clear_faults()`.",
         ),
+        (
+            error(messages.OVERTAKEN),
+            "The wristband refused SHOW: a later STOP or VENT has overtaken it. It was not applied.",
+        ),
         (error(200), "The wristband refused SHOW with error 200."),
     ],
 )
@@ -179,7 +183,7 @@ def test_every_refusal_has_its_sentence(received, sentence):
 def test_every_error_of_the_schema_is_explained():
     explained = {messages.UNKNOWN_MESSAGE, messages.WRONG_LENGTH, messages.OUT_OF_RANGE, messages.WRONG_COUNT}
     explained |= {messages.BAD_TABLE, messages.BAD_CRC, messages.NO_COMMON_PROTOCOL, messages.FAULTED}
-    explained |= {messages.BOARD_FAULT}
+    explained |= {messages.BOARD_FAULT, messages.OVERTAKEN}
     assert explained == {code for code, _, _ in messages.ERRORS}
 
 

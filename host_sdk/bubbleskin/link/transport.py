@@ -2,7 +2,9 @@
 
 import contextlib
 import errno
+import threading
 import time
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import serial
@@ -15,6 +17,7 @@ USB_IDS = ((0x2E8A, 0x0005),)
 
 
 _POLL = 0.01
+_PATIENCE = 0.02
 
 
 class Transport(Protocol):
@@ -46,15 +49,34 @@ class SerialTransport:
         self.name = url
         # Each change of an rfc2217 port's timeout is negotiated with its server: it keeps one.
         self._negotiates = url.startswith("rfc2217:")
+        self._port = self._open()
+        self._attempt: Attempt | None = None
+
+    def _open(self) -> Any:
+        url = self.name
         options: dict[str, Any] = {"timeout": _POLL} if self._negotiates else {"timeout": 0, "write_timeout": 2.0}
         if "://" not in url:
             options["exclusive"] = True
         try:
-            self._port = serial.serial_for_url(url, baudrate=115200, **options)
+            return serial.serial_for_url(url, baudrate=115200, **options)
         except ValueError as error:
             raise InvalidInput(f"{url} is not a port or URL that can be opened: {error}.") from None
         except (serial.SerialException, OSError) as error:
             raise LinkError(_why_not(url, error)) from None
+
+    def reopen(self) -> None:
+        """Open the port again after it has gone; `LinkError` where it is not there yet. Takes no longer than 20 ms."""
+        if self._attempt is None:
+            self._attempt = Attempt(self._close_and_open)
+        if self._attempt.done(_PATIENCE):  # closing a socket sleeps, finding another machine may take seconds
+            attempt, self._attempt = self._attempt, None
+            self._port = attempt.result()
+        else:
+            raise LinkError(f"{self.name} is still being opened.")
+
+    def _close_and_open(self) -> Any:
+        self.close()
+        return self._open()
 
     def read(self, timeout: float) -> bytes:
         """Wait up to `timeout` seconds for bytes; take all that are there."""
@@ -103,6 +125,34 @@ class SerialTransport:
             self._port.close()
         if left:
             left.close()
+
+
+class Attempt:
+    """Something that may take long and fail, tried in a thread."""
+
+    def __init__(self, act: Callable[[], Any]):
+        self._act = act
+        self._got: Any = None
+        self._error: Exception | None = None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._got = self._act()
+        except Exception as error:
+            self._error = error
+
+    def done(self, seconds: float) -> bool:
+        """Whether it has ended, after waiting up to so long."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    def result(self) -> Any:
+        """What came of it; raises what it raised."""
+        if self._error:
+            raise self._error
+        return self._got
 
 
 def attached() -> list[str]:

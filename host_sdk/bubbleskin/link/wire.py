@@ -40,8 +40,19 @@ class Received:
         return value
 
 
-def encode(name: str, sequence: int, fixed: Sequence[int] = (), repeated: Sequence[Sequence[int]] = ()) -> bytes:
-    """The frame of one message: `fixed` fields in the schema's order, `repeated` rows likewise."""
+def session_key(boot_id: int, session: int) -> bytes:
+    """What the CRCs of one session's frames are mixed with: CRC-32 of boot id and session, both u32."""
+    return crc32(boot_id.to_bytes(4, "little") + session.to_bytes(4, "little")).to_bytes(4, "little")
+
+
+def encode(
+    name: str,
+    sequence: int,
+    fixed: Sequence[int] = (),
+    repeated: Sequence[Sequence[int]] = (),
+    key: bytes = framing.NO_KEY,
+) -> bytes:
+    """The frame of one message: `fixed` fields in the schema's order, `repeated` rows likewise; `key` of `session_key`."""
     message = codec.BY_NAME[name]
     values = array("i", (_signed(value) for value in fixed))
     for row in repeated:
@@ -49,16 +60,24 @@ def encode(name: str, sequence: int, fixed: Sequence[int] = (), repeated: Sequen
     frame = bytearray(framing.FRAME_MAX)
     end = message.pack(values, len(repeated), frame, framing.Decoder.PAYLOAD_AT)
     framing.put_header(frame, message.id, sequence)
-    return bytes(frame[: framing.seal(frame, end - 1, _crc32_into)])
+    return bytes(frame[: framing.seal(frame, end - 1, _crc32_into, key)])
 
 
 class Reader:
-    """Bytes in, messages out. What is not a message of this protocol is dropped and counted."""
+    """Bytes in, messages out. What is not a message of this protocol, or of the session of `key`, is dropped and counted."""
 
-    def __init__(self) -> None:
-        self._decoder = framing.Decoder(_crc32_into)
+    def __init__(self, key: bytes = framing.NO_KEY) -> None:
+        self._decoder = framing.Decoder(_crc32_into, key)
         self._values = array("i", bytes(4 * framing.PAYLOAD_MAX))
         self.unknown = 0
+
+    def use(self, key: bytes) -> None:
+        """Understand the frames of the session of `key` from now on."""
+        self._decoder.key = key
+
+    def reset(self) -> None:
+        """Forget a frame begun, as after a reconnect."""
+        self._decoder.reset()
 
     @property
     def bad(self) -> int:
@@ -83,8 +102,6 @@ class Reader:
         if message is None:
             return None
         size = decoder.length - framing.HEADER
-        if not message.stride:
-            size = min(size, message.fixed_size)  # fields that newer firmware has appended
         count = message.unpack(decoder.frame, framing.Decoder.PAYLOAD_AT, size, self._values)
         if count < 0:
             return None
@@ -133,6 +150,8 @@ def explain(error: Received) -> str:
     if code == messages.BOARD_FAULT:
         faults = [sentence for bit, _, sentence in messages.BOARD_FAULTS if asked & bit & messages.VENTING]
         return f"The wristband refused {name}: {'; '.join(faults)}. Mend the cause, then `clear_faults()`."
+    if code == messages.OVERTAKEN:
+        return f"The wristband refused {name}: a later STOP or VENT has overtaken it. It was not applied."
     if code == messages.UNKNOWN_MESSAGE:
         return f"The wristband does not know {name}: its firmware is older than this SDK. Update the firmware."
     return f"The wristband refused {name} with error {code}."

@@ -38,6 +38,9 @@ class Firmware(Protocol):
     def tick(self, counts: array, link: bytes) -> Outputs:
         """One period: sensor counts (the supply's last) and bytes of the link in, decisions out."""
 
+    def reset(self, boot_id: int) -> None:
+        """Start it again, as after a power failure."""
+
     def close(self) -> None:
         """End it."""
 
@@ -51,7 +54,7 @@ class InProcessFirmware:
     self_test = False
 
     def __init__(self, board: ModuleType, boot_id: int):
-        self.boot_id = boot_id
+        self._board = board
         self._counts = array("H", bytes(2 * (board.BUBBLES + 1)))
         self._pulses = array("H", bytes(4 * board.BUBBLES))
         self._tick_us = board.TICK_US
@@ -59,7 +62,7 @@ class InProcessFirmware:
         self._dump = False
         self._in = b""
         self._out = bytearray()
-        self.app = App(board, self)
+        self.reset(boot_id)
 
     def tick(self, counts: array, link: bytes) -> Outputs:
         """See `Firmware`."""
@@ -68,6 +71,11 @@ class InProcessFirmware:
         self._out.clear()
         self.app.tick()
         return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
+
+    def reset(self, boot_id: int) -> None:
+        """See `Firmware`."""
+        self.boot_id = boot_id
+        self.app = App(self._board, self)
 
     def close(self) -> None:
         """Nothing to end."""
@@ -145,6 +153,8 @@ class SimulatedBoard:
         self.name = name
         self.tick_s: float = self.data.TICK_US * 1e-6
         self.plant = make_plant(name, n, seed, spread, contact)
+        self._boots = 0
+        self._seed = seed
         self.firmware = firmware or InProcessFirmware(self.data, boot_id=seed + 1)
         self.to_device = bytearray()
         self.from_device = bytearray()
@@ -194,6 +204,16 @@ class SimulatedBoard:
     def inject(self, fault: str, bubble: int, value: float = 1.0) -> None:
         """Give a bubble a fault, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 takes it away."""
         self.plant.inject(fault, bubble, value)
+
+    def reset(self) -> None:
+        """Start the firmware again, as after a power failure: it vents, and bytes under way are lost. The plant goes on."""
+        self._boots += 1
+        self.to_device.clear()
+        self.from_device.clear()
+        self.firmware.reset((self._seed + 1 + self._boots * 0x9E3779B1) & 0x3FFFFFFF)
+        self._decided = None
+        self.pulses[:, 0], self.pulses[:, 1] = 0.0, self.tick_s
+        self._pump, self._dump = 0.0, False
 
     def close(self) -> None:
         """End the firmware."""

@@ -38,6 +38,11 @@ class MicroPythonFirmware:
     """A `Firmware` in another process, talked to through `bubble_firmware.boards.lockstep`."""
 
     def __init__(self, board: ModuleType, boot_id: int):
+        self._board = board
+        self._start(boot_id)
+
+    def _start(self, boot_id: int) -> None:
+        board = self._board
         interpreter = find_micropython()
         program = _PROGRAM.format(path=source_path(), board=board.NAME, boot_id=boot_id)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has died
@@ -73,6 +78,11 @@ class MicroPythonFirmware:
             pulses.byteswap()
         at = self._size - LINK_OUT
         return Outputs(pulses, pump, bool(dump), answer[at : at + sent])
+
+    def reset(self, boot_id: int) -> None:
+        """See `Firmware`: another process."""
+        self.close()
+        self._start(boot_id)
 
     def close(self) -> None:
         """End the process."""

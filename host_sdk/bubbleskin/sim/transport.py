@@ -43,7 +43,7 @@ class SimulatedTransport:
         self._check()
         board = self.board
         until = board.time + timeout
-        while not board.from_device and board.time < until:
+        while (not board.from_device and board.time < until) or (self._pace and self._pace.owed() > 0):
             if self._pace:
                 self._pace.wait()
             board.tick()
