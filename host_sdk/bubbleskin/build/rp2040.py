@@ -28,6 +28,8 @@ from bubbleskin.interpreter import VERSION, cache_folder
 BOARDS = ("wristband7", "wristband19")
 BARE = "bare"
 """In a board's place: the firmware is frozen in, but MicroPython's prompt is what starts. For tests and benches."""
+STOCK = "stock"
+"""In a board's place: a MicroPython as one can download it, nothing of ours in it. For tests of `bubbleskin flash`."""
 
 CHIP = "RPI_PICO"
 """MicroPython's own name of the board that carries the RP2040."""
@@ -60,13 +62,20 @@ micropython.kbd_intr(-1)  # before anything else: a frame of the host may hold a
 
 from bubble_firmware.main import pico
 
-pico({board!r})
+try:
+    pico({board!r})
+except SystemExit:  # RESTART into the prompt: out of `main.py` it would be a soft reset, which starts us again
+    pass
 """
 """The frozen `main.py`: MicroPython runs it after boot, before any file of that name in flash."""
 
 MANIFEST = """\
 include("firmware/manifest.py")
 module("main.py", base_path="start", opt=3)
+"""
+
+MANIFEST_OF_STOCK = """\
+freeze("$(PORT_DIR)/modules")
 """
 
 
@@ -177,7 +186,9 @@ def fetch(home: Path, steps: Steps) -> None:
 
 def stage(home: Path, board: str, files: dict[str, bytes]) -> Path:
     """Lay the frozen files out as in the repository, touching only those that changed; the manifest to build."""
-    files = {**files, "start/main.py": b"" if board == BARE else START.format(board=board).encode()}
+    files = {**files, "start/main.py": b"" if board in (BARE, STOCK) else START.format(board=board).encode()}
+    if board == STOCK:
+        files["manifest.py"] = MANIFEST_OF_STOCK.encode()
     staging = home / "staging"
     for path in list(staging.rglob("*.py")):
         if path.relative_to(staging).as_posix() not in files:

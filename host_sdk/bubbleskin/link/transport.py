@@ -56,6 +56,11 @@ class SerialTransport:
         except (serial.SerialException, OSError) as error:
             raise LinkError(_why_not(url, error)) from None
 
+    @property
+    def port(self) -> Any:
+        """The pyserial port itself, for what is no wristband (yet): MicroPython's prompt."""
+        return self._port
+
     def read(self, timeout: float) -> bytes:
         """Wait up to `timeout` seconds for bytes; take all that are there."""
         try:
