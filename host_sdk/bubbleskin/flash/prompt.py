@@ -86,8 +86,13 @@ class Prompt(SerialTransport):
 
     def write(self, path: str, data: bytes) -> None:
         """Write a file."""
-        with _sentences(self.device_name):
-            self.fs_writefile(path, data, chunk_size=_CHUNK)
+        script = f"file = open({path!r}, 'wb')\n"
+        for at in range(0, max(len(data), 1), _CHUNK):
+            script += f"file.write({data[at : at + _CHUNK]!r})\n"
+            if at + _CHUNK >= len(data):
+                script += "file.close()\n"
+            self.run(script)
+            script = ""
 
     def put(self, path: str, data: bytes) -> None:
         """Write a file so that at any moment the old or the new one is there, whole."""

@@ -70,7 +70,9 @@ def write(prompt: Prompt, slots: Slots, files: dict[str, bytes], report: Progres
         report("installing the firmware", done, total)
         if name == mpy.LAST:
             _verify(prompt, slot, {other: entry for other, entry in wanted.items() if other != name})
-        prompt.put(f"{folder}/{name}", files[name])
+            prompt.put(f"{folder}/{name}", files[name])
+        else:
+            prompt.write(f"{folder}/{name}", files[name])
         done += len(files[name])
     report("installing the firmware", total, total)
     _verify(prompt, slot, wanted)

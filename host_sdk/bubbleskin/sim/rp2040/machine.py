@@ -19,7 +19,7 @@ from bubbleskin.sim.rp2040.mcp3208 import Mcp3208
 
 PORT = "emulated"
 FLASH_SIZE = 2 << 20
-_STEP = 1e-3
+_STEP = 2e-4
 _PATIENCE = 10.0  # emulated seconds that a read of the port waits
 _PUMP_SLICE = 7
 
@@ -181,18 +181,23 @@ class EmulatedPort:
 
     def __init__(self, connection: EmulatedConnection):
         self._connection = connection
+        self._asked = False  # in vain, the last time
 
     def inWaiting(self) -> int:
-        """How many bytes are there; lets a moment pass where there are none."""
-        return self._connection.wait(20 * _STEP, 1)
+        """How many bytes are there; who asks again and again lets time pass."""
+        count = self._connection.wait(20 * _STEP if self._asked else 0.0, 1)
+        self._asked = not count
+        return count
 
     def read(self, count: int = 1) -> bytes:
         """`count` bytes, fewer where they do not come."""
+        self._asked = False
         self._connection.wait(_PATIENCE, count)
         return self._connection.take(count)
 
     def write(self, data: bytes) -> int:
         """Send bytes to the board."""
+        self._asked = False
         self._connection.write(data)
         return len(data)
 
