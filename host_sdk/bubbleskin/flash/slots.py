@@ -6,6 +6,7 @@ folders of slots are touched; all others, the stored calibration among them, are
 """
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from bubbleskin.errors import BubbleskinError
@@ -38,6 +39,27 @@ def look(prompt: Prompt) -> Slots:
     now = prompt.text(starter.POINTER)[:1]
     now = now if now in starter.SLOTS else ""
     return Slots(now, "b" if now == "a" else "a", prompt.text(starter.MAIN))
+
+
+def update(
+    prompt: Prompt,
+    slots: Slots,
+    files: dict[str, bytes],
+    report: Progress,
+    try_it: Callable[[Prompt, str], Prompt],
+) -> Prompt:
+    """Bring `files` onto the board and into use; returns the prompt to go on with.
+
+    `try_it` restarts the board, sees the firmware in the slot it is given answer, ends it, and returns its prompt.
+    Where it raises, the board has its old firmware in use.
+    """
+    slot = write(prompt, slots, files, report)
+    install_starter(prompt, slots)
+    if slot != slots.now:
+        try_next(prompt, slot)
+        prompt = try_it(prompt, slot)
+    use(prompt, slot)
+    return prompt
 
 
 def write(prompt: Prompt, slots: Slots, files: dict[str, bytes], report: Progress) -> str:

@@ -322,13 +322,7 @@ class _Update:
 
     def by_files(self, prompt: Prompt, there: slots.Slots) -> Outcome:
         board = self.board()
-        slot = slots.write(prompt, there, self.files(board), self.report)
-        slots.install_starter(prompt, there)
-        if slot != there.now:
-            slots.try_next(prompt, slot)
-            self.reset(prompt)
-            prompt = self.confirm(slot, board)
-        slots.use(prompt, slot)
+        prompt = slots.update(prompt, there, self.files(board), self.report, self.try_it)
         self.reset(prompt)
         info = self.wait_for_hello(
             f"The new firmware had answered, and does not after the last restart, within {_BACK_S:g} s. Unplug the "
@@ -342,8 +336,10 @@ class _Update:
             prompt.leave("import machine; machine.reset()")
         prompt.serial.close()
 
-    def confirm(self, slot: str, board: str) -> Prompt:
-        """See the firmware in `slot` answer, and make it end; its prompt."""
+    def try_it(self, prompt: Prompt, slot: str) -> Prompt:
+        """Restart, see the firmware in `slot` answer, and make it end; its prompt."""
+        self.reset(prompt)
+        board = self.board()
         kept = "The board keeps what it had: nothing but the new files has changed."
         try:
             info = self.wait_for_hello(f"The new firmware does not answer within {_BACK_S:g} s. {kept}")
