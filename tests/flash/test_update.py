@@ -48,7 +48,7 @@ def test_a_running_firmware_is_asked_for_the_boot_loader(computer, bring, file, 
 def test_power_lost_after_any_block_is_repaired_by_the_next_flash(computer, bring, cut, images):
     computer.plug_in(bootsel=True)
     computer.cut_after = cut
-    with pytest.raises(LinkError, match="has gone after|no wristband answers"):  # the last block looks like the end
+    with pytest.raises(LinkError, match=r"has gone after|no wristband answers"):  # the last block looks like the end
         bring(board="wristband7")
     computer.plug_in()  # no button
     if cut == 1:

@@ -39,7 +39,12 @@ def check(drive: Path) -> None:
 def copy(machine: Machine, drive: Path, image: Image, report: Progress) -> None:
     """Copy `image` onto `drive` and leave the board to start it. Errors say how the board is left and what to do."""
     data = image.for_drive()
-    free = machine.free(drive)
+    try:
+        free = machine.free(drive)
+    except OSError as error:
+        raise LinkError(
+            f"The drive {drive} has gone ({error.strerror}). Plug the wristband in again, then flash again."
+        ) from None
     if free < len(data):
         raise BubbleskinError(
             f"{drive} has {free // 1024} KiB free, and the firmware needs {-(-len(data) // 1024)}. "

@@ -85,6 +85,7 @@ class _Update:
         self.files = files
         self.kept = kept
         self.others: set[str] = set()  # ports of boards that are not meant
+        self.unlisted = False  # whether the port is a socket, a link or anything else that `ports` does not tell of
         self.port = ""
         self.old: Info | None = None
         self.complaint = ""  # of the last HELLO
@@ -117,6 +118,7 @@ class _Update:
         if order.device:
             self.port = order.device
             self.others = set(ports) - {order.device}
+            self.unlisted = order.device not in ports
             return None
         if len(ports) + len(found) > 1:
             names = ", ".join([*ports, *map(str, found)])
@@ -260,9 +262,7 @@ class _Update:
         while machine.now() < until:
             self.report("waiting for the firmware's answer", 0, 1)
             machine.sleep(_STEP_S)
-            if self.order.device and not machine.ports():  # a socket, or a port that has no USB id
-                self.port = self.order.device
-            else:  # it may come back under another name
+            if not self.unlisted:  # it may come back under another name
                 new = [port for port in machine.ports() if port not in self.others]
                 if not new:
                     continue
@@ -281,7 +281,9 @@ class _Update:
         try:
             prompt = self.enter(connection)
             there = slots.look(prompt)
-            if not self.order.mpy and not there.ours and (self.old or self.order.uf2 or self.order.previous):
+            # A UF2 of ours starts by itself and takes no notice of files, which may be there from before.
+            as_files = bool(slots.running(prompt)[0]) if self.old else there.ours
+            if not self.order.mpy and not as_files and (self.old or self.order.uf2 or self.order.previous):
                 self.image()
                 return self.by_uf2(self.into_boot_loader(prompt))
             if self.order.uf2 or self.order.previous:
@@ -289,7 +291,7 @@ class _Update:
                     "The board runs a stock MicroPython with our files, and a UF2 would take its place: if that is meant, "
                     f"{BOOTSEL}. Its files stay."
                 )
-            if self.old and not there.ours:
+            if self.old and not as_files:
                 raise InvalidInput(
                     "The firmware is part of this board's UF2, and files would not be used: leave --mpy off."
                 )
