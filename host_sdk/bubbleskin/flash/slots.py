@@ -76,9 +76,10 @@ def write(prompt: Prompt, slots: Slots, files: dict[str, bytes], report: Progres
     stale = [name for name, entry in found.items() if entry and wanted.get(name[len(folder) + 1 :]) != entry]
     start = f"{folder}/{mpy.LAST}"
     missing = [name for name in files if found.get(f"{folder}/{name}") != wanted[name]]
+    if missing and mpy.LAST not in missing:
+        missing.append(mpy.LAST)
     if missing and start in found:  # first of all: a slot with `LAST` counts as whole
         stale = [start, *(name for name in stale if name != start)]
-        missing = [*(name for name in missing if name != mpy.LAST), mpy.LAST]
     for name in stale:
         prompt.remove(name)
     folders = [folder, *dict.fromkeys(f"{folder}/{path}" for name in files for path in _folders(name))]
@@ -88,16 +89,16 @@ def write(prompt: Prompt, slots: Slots, files: dict[str, bytes], report: Progres
             prompt.run(f"import os; os.mkdir({path!r})")
     total = sum(len(files[name]) for name in missing)
     done = 0
-    for name in missing:
+    for name in (name for name in missing if name != mpy.LAST):
         report("installing the firmware", done, total)
-        if name == mpy.LAST:
-            _verify(prompt, slot, {other: entry for other, entry in wanted.items() if other != name})
-            prompt.put(f"{folder}/{name}", files[name])
-        else:
-            prompt.write(f"{folder}/{name}", files[name])
+        prompt.write(f"{folder}/{name}", files[name])
         done += len(files[name])
+    report("installing the firmware", done, total)
+    if missing:
+        _verify(_below(prompt, slot), {name: entry for name, entry in wanted.items() if name != mpy.LAST})
+        prompt.put(start, files[mpy.LAST])
+        _verify({mpy.LAST: prompt.sum(start)}, {mpy.LAST: wanted[mpy.LAST]})
     report("installing the firmware", total, total)
-    _verify(prompt, slot, wanted)
     return slot
 
 
@@ -143,12 +144,11 @@ def _below(prompt: Prompt, slot: str) -> dict[str, tuple[int, bytes]]:
     return {name[len(folder) + 1 :]: entry for name, entry in prompt.tree(folder).items() if entry}
 
 
-def _verify(prompt: Prompt, slot: str, wanted: dict[str, tuple[int, bytes]]) -> None:
-    there = _below(prompt, slot)
+def _verify(there: dict[str, tuple[int, bytes]], wanted: dict[str, tuple[int, bytes]]) -> None:
     wrong = sorted(name for name in wanted.keys() | there.keys() if wanted.get(name) != there.get(name))
     if wrong:
         raise BubbleskinError(
-            f"{wrong[0]} is not on the board as it was sent, nor are {len(wrong) - 1} others. The firmware that was "
+            f"{wrong[0]} and {len(wrong) - 1} other files are not on the board as they were sent. The firmware that was "
             "there is still in use. Flash again; if this stays so, the board's flash is worn out."
         )
 
