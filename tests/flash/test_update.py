@@ -55,8 +55,11 @@ def test_power_lost_after_any_block_is_repaired_by_the_next_flash(computer, brin
         assert computer.board  # the old firmware, unharmed
         computer.plug_in(bootsel=True)
     assert computer.rom
-    outcome = bring(board="wristband7")
+    outcome = bring()  # this computer remembers which board it was
     assert outcome.info.board == "wristband7"
+    computer.plug_in(bootsel=True)
+    with pytest.raises(InvalidInput, match="Which wristband is it"):
+        bring()
     assert computer.flash.startswith(images.new.data)
 
 

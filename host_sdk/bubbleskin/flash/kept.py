@@ -8,6 +8,26 @@ from bubbleskin.interpreter import cache_folder
 _KEPT = 2
 
 
+class UnderWay:
+    """Which board an update has been begun on and not ended: in its boot loader it could not say so itself."""
+
+    def __init__(self, folder: Path | None = None):
+        self._note = (folder or cache_folder() / "flashed") / "under-way"
+
+    def begin(self, board: str) -> None:
+        """From now on the board may be without firmware."""
+        self._note.parent.mkdir(parents=True, exist_ok=True)
+        self._note.write_text(board)
+
+    def board(self) -> str | None:
+        """The board whose update was not ended."""
+        return self._note.read_text() if self._note.is_file() else None
+
+    def end(self) -> None:
+        """It has answered."""
+        self._note.unlink(missing_ok=True)
+
+
 class Kept:
     """The last UF2s of one kind of board that answered HELLO after they had been copied, the newest first."""
 

@@ -9,7 +9,7 @@ from bubbleskin.build.rp2040 import BOARDS, firmware
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError, WrongDevice
 from bubbleskin.flash import drive as drives
 from bubbleskin.flash import mpy, slots, uf2
-from bubbleskin.flash.kept import Kept
+from bubbleskin.flash.kept import Kept, UnderWay
 from bubbleskin.flash.machine import Connection, Machine
 from bubbleskin.flash.prompt import Prompt
 from bubbleskin.link.session import drive as run
@@ -21,7 +21,7 @@ _DRIVE_S = 20.0  # until the boot loader's drive is there and mounted
 _BACK_S = 30.0  # until new firmware answers
 _STEP_S = 0.25
 
-BOOTSEL = "unplug the wristband, hold BOOTSEL while you plug it in, then run `bubbleskin flash --board …` again"
+BOOTSEL = "unplug the wristband, hold BOOTSEL while you plug it in, then run `bubbleskin flash` again"
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,7 @@ class _Update:
         self.build = build
         self.files = files
         self.kept = kept
+        self.under_way = UnderWay(kept)
         self.others: set[str] = set()  # ports of boards that are not meant
         self.unlisted = False  # whether the port is a socket, a link or anything else that `ports` does not tell of
         self.port = ""
@@ -156,8 +157,9 @@ class _Update:
         """The board's name, which neither a boot loader nor a stock MicroPython knows."""
         if self.old:
             return self.old.board
-        if self.order.board:
-            return self.order.board
+        name = self.order.board or self.under_way.board()
+        if name:
+            return name
         raise InvalidInput(
             f"Which wristband is it? Nothing of ours is on it yet to say so: add --board {' or --board '.join(BOARDS)}."
         )
@@ -182,6 +184,7 @@ class _Update:
     def into_boot_loader(self, prompt: Prompt | None = None) -> Path:
         """Let the board go into its boot loader; its drive."""
         before = set(self.machine.drives())
+        self.under_way.begin(self.board())
         if prompt:
             with contextlib.suppress(LinkError):  # it may be gone before it has acknowledged
                 prompt.leave("import machine; machine.bootloader()")
@@ -233,6 +236,7 @@ class _Update:
             uf2.block(n, len(image.pages), uf2.FLASH_AT + uf2.PAGE * n, p) for n, p in enumerate(image.pages)
         )
         kept.tried(known)
+        self.under_way.begin(board)
         drives.copy(self.machine, drive, image, self.report)
         back = (
             "; `bubbleskin flash --previous` then brings the last firmware back that worked" if kept.previous() else ""
@@ -243,6 +247,7 @@ class _Update:
         )
         self.check_answer(info, board, remedy)
         kept.remember(known)
+        self.under_way.end()
         return Outcome("uf2", info, self.old.firmware if self.old else None)
 
     def check_answer(self, info: Info, board: str, remedy: str) -> None:
@@ -324,6 +329,7 @@ class _Update:
 
     def by_files(self, prompt: Prompt, there: slots.Slots) -> Outcome:
         board = self.board()
+        self.under_way.begin(board)
         prompt = slots.update(prompt, there, self.files(board), self.report, self.try_it)
         self.reset(prompt)
         info = self.wait_for_hello(
@@ -331,6 +337,7 @@ class _Update:
             "wristband, plug it in, then flash again."
         )
         self.check_answer(info, board, "Flash again.")
+        self.under_way.end()
         return Outcome("mpy", info, self.old.firmware if self.old else None)
 
     def reset(self, prompt: Prompt) -> None:
