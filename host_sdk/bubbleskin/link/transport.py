@@ -78,6 +78,11 @@ class SerialTransport:
         self.close()
         return self._open()
 
+    @property
+    def port(self) -> Any:
+        """The pyserial port itself, for what is no wristband (yet): MicroPython's prompt."""
+        return self._port
+
     def read(self, timeout: float) -> bytes:
         """Wait up to `timeout` seconds for bytes; take all that are there."""
         try:

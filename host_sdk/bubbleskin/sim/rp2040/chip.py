@@ -21,6 +21,7 @@ from rp2040py.utils.logging import ConsoleLogger, LogLevel
 CLOCK_HZ = 125_000_000
 _BEYOND = 8 << 20  # where the emulator has flash and a Pico has none
 _PACKET = 64  # bytes of one USB packet
+_VECTORED = 0xB007C0D3  # in SCRATCH4: start at the address in SCRATCH7, as only the ROM's `reset_to_usb_boot` asks
 
 
 class QuietCdc(USBCDC):
@@ -60,23 +61,27 @@ class QuietCdc(USBCDC):
 
 
 class Chip:
-    """An RP2040 that starts from the UF2 at `path` when it is first run.
+    """An RP2040 that starts from the UF2 at `path`, or from what is in `flash`, when it is first run.
 
     `from_device` collects what it sends over USB. `mcu` is the emulator's own object, for what is soldered to the
-    pins. `resets` counts watchdog and other resets since the start.
+    pins. `resets` counts watchdog and other resets since the start. `in_boot_loader`: it has asked for the ROM's
+    boot loader, whose USB the emulator cannot do; see `bubbleskin.sim.rp2040.boot_rom`.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path | None, flash: bytes | bytearray = b""):
         self.mcu = RP2040()
         self.mcu.load_bootrom(BOOTROM_B1)
         self.mcu.logger = ConsoleLogger(LogLevel.ERROR)
-        load_uf2(path, self.mcu)
+        self.mcu.flash[: len(flash)] = flash
+        if path:
+            load_uf2(path, self.mcu)
         self.mcu.core.pc = FLASH_START_ADDRESS
         self._simulator = Simulator(rp2040=self.mcu)
         self._stop = self.mcu.clock.create_alarm(self._simulator.stop)
         self.from_device = bytearray()
         self.connected = False
         self.resets = 0
+        self.in_boot_loader = False
         self._cdc = QuietCdc(self.mcu.usb_ctrl)
         self._cdc.on_serial_data = self.from_device.extend
         self._cdc.on_device_connected = self._connect
@@ -137,6 +142,7 @@ class Chip:
     def _reset(self) -> None:
         self.resets += 1
         self.connected = False
+        self.in_boot_loader = self.mcu.watchdog.scratch_data[4] == _VECTORED
         self.mcu.enter_reset(from_watchdog=True)
         for look in self._watchers:  # the pads let go, which the emulator does not tell
             look()

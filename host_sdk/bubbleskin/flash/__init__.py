@@ -1,0 +1,6 @@
+"""`bubbleskin flash`: firmware onto boards, so that an interruption at any point is mended by the next time."""
+
+from bubbleskin.flash.machine import Machine, ThisMachine
+from bubbleskin.flash.update import Order, Outcome, flash
+
+__all__ = ["Machine", "Order", "Outcome", "ThisMachine", "flash"]
