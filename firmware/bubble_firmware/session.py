@@ -58,6 +58,10 @@ class Session:
             messages.RESTART: self._restart,
         }
 
+    def serve(self, handlers):
+        """Let others handle requests: functions of the count of repetitions, by message id."""
+        self._requests.update(handlers)
+
     def poll(self):
         """Handle what has come since the last tick; send telemetry when it is due."""
         if self._owed and self._app.hands.send(self._frame, self._owed):
@@ -141,7 +145,7 @@ class Session:
         values[26] = board.HEIGHT_MAX_UM
         values[27] = board.PRESSURE_MAX_PA
         values[28] = 1  # one request at a time
-        values[29] = 0
+        values[29] = messages.STORE
         values[30] = self._app.tables.crc
         self._reply(0)
 
@@ -173,6 +177,7 @@ class Session:
         values[13] = test.untrue_zero
         values[14] = test.unfilled
         values[15] = test.unvented
+        values[16] = app.store.source
         self._reply(0)
 
     def _show(self, count):

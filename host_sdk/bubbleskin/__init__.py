@@ -16,6 +16,7 @@ from bubbleskin.errors import (
 from bubbleskin.layout import Layout
 from bubbleskin.records import Health, Info, State
 from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.stored import Figures, StoreInfo
 
 if TYPE_CHECKING:
     from bubbleskin.physics import (
@@ -50,6 +51,7 @@ __all__ = [
     "DeviceFault",
     "DeviceRefused",
     "DeviceSilent",
+    "Figures",
     "Health",
     "Info",
     "InvalidInput",
@@ -57,6 +59,7 @@ __all__ = [
     "LinkError",
     "Skin",
     "State",
+    "StoreInfo",
     "Table",
     "WrongDevice",
     "YeohBalloon",

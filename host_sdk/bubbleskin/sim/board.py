@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bubble_firmware import boards
 from bubble_firmware.app import App
 from bubbleskin.errors import InvalidInput
+from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.plant import Plant, PlantParameters
 
 BOARDS = ("wristband7", "wristband19")
@@ -36,6 +37,9 @@ class Firmware(Protocol):
     def tick(self, counts: array, link: bytes) -> Outputs:
         """One period: sensor counts (the supply's last) and bytes of the link in, decisions out."""
 
+    def reset(self) -> None:
+        """Power fails and comes back: start again, with what flash holds."""
+
     def close(self) -> None:
         """End it."""
 
@@ -48,8 +52,11 @@ class InProcessFirmware:
     boot_faults = 0
     self_test = False
 
-    def __init__(self, board: ModuleType, boot_id: int):
+    def __init__(self, board: ModuleType, boot_id: int, flash: NorFlash | None = None):
         self.boot_id = boot_id
+        self.flash = flash or NorFlash()
+        self._board = board
+        self._restarting = False
         self._counts = array("H", bytes(2 * (board.BUBBLES + 1)))
         self._pulses = array("H", bytes(4 * board.BUBBLES))
         self._tick_us = board.TICK_US
@@ -65,7 +72,15 @@ class InProcessFirmware:
         self._in = link
         self._out.clear()
         self.app.tick()
+        if self._restarting:
+            self.reset()
         return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
+
+    def reset(self) -> None:
+        """See `Firmware`."""
+        self._restarting = False
+        self.boot_id += 1
+        self.app = App(self._board, self)
 
     def close(self) -> None:
         """Nothing to end."""
@@ -108,7 +123,8 @@ class InProcessFirmware:
         """The interpreter collects by itself."""
 
     def restart(self, into: int) -> None:
-        """There is nothing to start again from."""
+        """Start again after this tick; there is no other boot loader or prompt."""
+        self._restarting = True
 
     def phase_us(self) -> int:
         """Time stands still within a tick."""
@@ -121,11 +137,17 @@ class SimulatedBoard:
     `name`: wristband7 or wristband19. `seed`: of sensor noise and spread. `spread`: how much walls, valves and
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
     reservoir starts full, as on a board that has been powered for a while. `firmware`: what runs the firmware;
-    None is this interpreter.
+    None is this interpreter, with `flash` for its store.
     """
 
     def __init__(
-        self, name: str = "wristband7", *, seed: int = 0, spread: float = 0.0, firmware: Firmware | None = None
+        self,
+        name: str = "wristband7",
+        *,
+        seed: int = 0,
+        spread: float = 0.0,
+        firmware: Firmware | None = None,
+        flash: NorFlash | None = None,
     ):
         self.data = load_board(name)
         if not (math.isfinite(spread) and 0 <= spread <= 0.5):
@@ -137,7 +159,7 @@ class SimulatedBoard:
         self.tick_s: float = self.data.TICK_US * 1e-6
         parameters = PlantParameters.spread(n, spread, seed) if spread else PlantParameters.nominal(n)
         self.plant = Plant(parameters, seed=seed)
-        self.firmware = firmware or InProcessFirmware(self.data, boot_id=seed + 1)
+        self.firmware = firmware or InProcessFirmware(self.data, seed + 1, flash)
         self.to_device = bytearray()
         self.from_device = bytearray()
         self.pulses = np.zeros((n, 2))
@@ -182,6 +204,14 @@ class SimulatedBoard:
             np.minimum(pulses * 1e-6, self.tick_s, out=self.pulses)
         self._pump = outputs.pump / 65535
         self._dump = outputs.dump
+
+    def reset(self) -> None:
+        """Power fails and comes back: the firmware starts again, with what flash holds; bytes under way are lost."""
+        self.to_device.clear()
+        self.from_device.clear()
+        self.pulses[:] = 0.0, self.tick_s
+        self._pump, self._dump, self._decided = 0.0, False, None
+        self.firmware.reset()
 
     def inject(self, fault: str, bubble: int, value: float = 1.0) -> None:
         """Give a bubble a fault, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 takes it away."""
