@@ -1,10 +1,12 @@
 """The store against a model, in any order of saves, cuts, resets, reboots and bits that rot."""
 
+import contextlib
 import random
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 
 from bubble_protocol import messages
 from bubbleskin.sim.flash import NorFlash, PowerCut
@@ -92,10 +94,8 @@ def machine(kit):
         @rule(after=st.integers(0, 3), seed=SEEDS, share=st.sampled_from([0, 0.01, 0.3, 0.7, 0.99, 1]))
         def reset_cut_short(self, after, seed, share):
             self.flash.cut(after, torn(seed, share))
-            try:
+            with contextlib.suppress(PowerCut):
                 assert self.device.store.reset()
-            except PowerCut:
-                pass
             self.flash.cut(-1, torn(seed, share))
             old, second = self.stored, self.second
             found = self.boot(old, kit.FACTORY_CONTENT)
@@ -126,10 +126,9 @@ def machine(kit):
     return StoreMachine
 
 
-def test_any_history_leaves_one_whole_record(kit):
-    from hypothesis.stateful import run_state_machine_as_test
-
+@pytest.mark.parametrize("examples", [10, pytest.param(200, marks=pytest.mark.slow)])
+def test_any_history_leaves_one_whole_record(kit, examples):
     run_state_machine_as_test(
         machine(kit),
-        settings=settings(max_examples=60, stateful_step_count=25, suppress_health_check=[HealthCheck.too_slow]),
+        settings=settings(max_examples=examples, stateful_step_count=25, suppress_health_check=[HealthCheck.too_slow]),
     )
