@@ -4,6 +4,7 @@ import random
 
 import pytest
 
+from bubble_protocol import messages
 from bubbleskin.sim.flash import PAGE, SECTOR, NorFlash, PowerCut
 
 # Operations are issued one by one by one thread, each waits until the chip is done, and the chip does one at a time: what
@@ -87,7 +88,7 @@ def histories(kit, data, saves, generation):
     flash = NorFlash()
     if saves:
         device = kit.Device(NorFlash(), data)
-        first = kit.make_record(kit.sections_of(device.change(100)).values(), generation)
+        first = kit.make_record(kit.sections_of(device.change(100)).values(), generation, name=data.NAME)
         flash = kit.flash_with(first)
     for number in range(1, saves):
         device = kit.Device(flash, data)
@@ -176,3 +177,20 @@ def test_with_records_of_more_than_a_sector(kit, saves):
         assert device.store.save()
 
     cut_everywhere(kit, flash, data, commit, PROGRAM[:6], ERASE)
+
+
+def test_until_the_last_page_there_is_nothing_that_looks_like_a_record(kit):
+    """So nothing but the cut of that one page relies on the CRC."""
+    data = kit.board("wristband19")
+    flash = histories(kit, data, 2, 1)
+    whole = copy(flash)
+    save(kit.Device(whole, data))
+    assert whole.kinds[-1] == ("program", 0)
+    assert [kind for kind, _ in whole.kinds[:3]] == ["erase", "erase", "program"]
+    for number in range(1, len(whole.kinds)):
+        torn = copy(flash)
+        device = kit.Device(torn, data)
+        torn.cut(number, bytes_of(0, 0))
+        with pytest.raises(PowerCut):
+            save(device)
+        assert kit.Device(torn, data).store.states[0] == messages.BLANK
