@@ -184,6 +184,11 @@ def test_until_the_last_page_there_is_nothing_that_looks_like_a_record(kit):
     data = kit.board("wristband19")
     flash = histories(kit, data, 2, 1)
     whole = copy(flash)
+
+    def save(device):
+        device.change(61)
+        assert device.store.save()
+
     save(kit.Device(whole, data))
     assert whole.kinds[-1] == ("program", 0)
     assert [kind for kind, _ in whole.kinds[:3]] == ["erase", "erase", "program"]
