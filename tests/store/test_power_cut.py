@@ -168,12 +168,12 @@ def test_with_records_of_more_than_a_sector(kit, saves):
     flash = NorFlash()
     for number in range(saves):
         device = kit.Device(flash, data)
-        device.change(60 + number)
+        device.change(42 + number)
         assert device.store.save()
     assert flash.erases[1] == 1, "two sectors a slot"
 
     def commit(device):
-        device.change(61 + saves)
+        device.change(42 + saves)
         assert device.store.save()
 
     cut_everywhere(kit, flash, data, commit, PROGRAM[:6], ERASE)
@@ -186,7 +186,7 @@ def test_until_the_last_page_there_is_nothing_that_looks_like_a_record(kit):
     whole = copy(flash)
 
     def save(device):
-        device.change(61)
+        device.change(44)
         assert device.store.save()
 
     save(kit.Device(whole, data))
