@@ -2,7 +2,8 @@
 
 `bubbleskin firmware build` uses it, and so can a MicroPython checkout:
 
-    make -C ports/rp2 BOARD=RPI_PICO FROZEN_MANIFEST=/path/to/firmware/manifest.py
+    make -C ports/rp2 BOARD=RPI_PICO FROZEN_MANIFEST=/path/to/firmware/manifest.py \\
+        USER_C_MODULES=/path/to/firmware/micropython.cmake
 
 The start, a `main.py` with the board's name, is added by `bubbleskin firmware build`, which knows the board.
 """

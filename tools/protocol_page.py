@@ -153,6 +153,9 @@ def page() -> str:
     parts += ["## Mode of the board\n", enumeration(messages.MODES, "mode")]
     parts += ["## Status of a bubble\n", enumeration(messages.STATUSES, "status")]
     parts += ["## Faults of a bubble\n", "Bits; they stay until CLEAR.\n", enumeration(messages.FAULTS, "bit")]
+    parts += ["## Store\n", "Where what is in use comes from:\n", enumeration(messages.STORES, "store")]
+    parts += ["What one of its slots holds:\n", enumeration(messages.SLOTS, "slot")]
+    parts += ["## Capabilities\n", "Bits.\n", enumeration(messages.CAPABILITIES, "bit")]
     parts += [
         "## Messages\n",
         "Kinds: u is unsigned, i is signed, the number counts bits; text16 is 16 bytes of ASCII, zero padded. Where\n"

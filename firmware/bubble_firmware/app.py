@@ -18,13 +18,17 @@
     alarms                      board faults that are there now, bits
     boot_faults                 board faults since boot, bits
     self_test                   whether there is hardware to test
+    flash                       where the store is, see `store`; None where there is none
 """
 
 from array import array
 
 from bubble_firmware.bubbles import Bubbles
+from bubble_firmware.figures import Figures
 from bubble_firmware.selftest import SelfTest
 from bubble_firmware.session import Session
+from bubble_firmware.store import Store
+from bubble_firmware.store_requests import StoreRequests
 from bubble_firmware.supply import Supply
 from bubble_firmware.table import Tables
 from bubble_firmware.ticks import bins, count
@@ -52,7 +56,10 @@ class App:
         self.bubbles = Bubbles(board, self.tables)
         self.supply = Supply(board)
         self.self_test = SelfTest(board, hands.self_test)
+        self.figures = Figures(board, self.bubbles)
+        self.store = Store(self, getattr(hands, "flash", None))
         self.session = Session(self)
+        StoreRequests(self, self.session)
         self._counts = array("H", bytearray(2 * (board.BUBBLES + 1)))
         hands.vent()
 

@@ -46,8 +46,7 @@ class Bubbles:
             row[at + control.ZERO] = board.SENSOR_ZERO
             row[at + control.OPENS_US] = board.VALVE_OPENS_US
             row[at + control.CLOSES_US] = board.VALVE_CLOSES_US
-            # C (1e-6 dm³/(s bar)) 1e-14 SI, times 1e5 Pa (ANR) 8 Pa/(1 - b), W to µJ/ms, *65536
-            row[at + control.FLOW_GAIN] = board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO))
+            row[at + control.FLOW_GAIN] = control.flow_gain(board)
             row[at + control.TARGET] = row[at + control.START] = board.HEIGHT_REST_UM
             row[at + control.HEIGHT] = row[at + control.SETPOINT] = board.HEIGHT_REST_UM << 4
             row[at + control.ROOT] = 10000
@@ -101,6 +100,14 @@ class Bubbles:
         What leads to a fault goes on counting: a host that clears all the time does not disarm the guard.
         """
         control.forget(self._rows, self.count)
+
+    def figure(self, bubble, number):
+        """One of the figures of a bubble, see `figures`."""
+        return self._rows[bubble * control.ROW + number]
+
+    def set_figure(self, bubble, number, value):
+        """Take up one of the figures of a bubble."""
+        self._rows[bubble * control.ROW + number] = value
 
     def pressure_pa(self, bubble):
         """Gauge pressure of one bubble."""

@@ -18,7 +18,7 @@ their arguments because viper keeps the first three in registers.
 
 from bubble_protocol.portable import const, micropython, ptr16, ptr32, uint
 
-# One row: where each number of a bubble stands.
+# One row: where each number of a bubble stands. The first four are its figures, in the order of `figures`.
 ZERO = const(0)  # sensor counts at no pressure
 OPENS_US = const(1)  # valve dead times
 CLOSES_US = const(2)
@@ -109,6 +109,12 @@ FAULT = const(4)
 OVERPRESSURE = const(1)
 SENSOR_LOST = const(2)
 VALVE_TIME = const(4)
+
+
+def flow_gain(board):
+    """FLOW_GAIN of the board's restrictors."""
+    # C (1e-6 dm³/(s bar)) 1e-14 SI, times 1e5 Pa (ANR) 8 Pa/(1 - b), W to µJ/ms, *65536
+    return board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO))
 
 
 @micropython.viper

@@ -1,5 +1,7 @@
 """Where the firmware starts: choose the board, then tick."""
 
+import gc
+
 from bubble_firmware import boards
 from bubble_firmware.app import App, run
 
@@ -9,7 +11,10 @@ def lockstep(name, boot_id):
     from bubble_firmware.boards.lockstep import Hands
 
     board = boards.load(name)
-    run(App(board, Hands(board.BUBBLES, boot_id)))
+    hands = Hands(board.BUBBLES, boot_id)
+    while not hands.ended:
+        run(App(board, hands))
+        gc.collect()
 
 
 def pico(name):

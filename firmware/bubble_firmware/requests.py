@@ -64,6 +64,7 @@ class Requests:
         values[13] = test.untrue_zero
         values[14] = test.unfilled
         values[15] = test.unvented
+        values[16] = app.store.source
         self._reply(0)
 
     def _show(self, count):

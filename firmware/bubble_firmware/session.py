@@ -54,6 +54,10 @@ class Session(Requests):
         self._requests[messages.SUBSCRIBE] = self._subscribe
         self._slow = {messages.TABLE_WRITE, messages.TABLE_COMMIT, messages.TABLE_READ, messages.TICKS}
 
+    def serve(self, handlers):
+        """Let others handle requests: functions of the count of repetitions, by message id."""
+        self._requests.update(handlers)
+
     def poll(self):
         """Handle what has come since the last tick; send telemetry when it is due."""
         if self._owed:

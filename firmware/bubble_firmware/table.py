@@ -6,7 +6,7 @@ Two sets: the one in use and the one being received. A commit checks the receive
 from array import array
 
 from bubble_firmware.nominal import KNOTS as NOMINAL
-from bubble_protocol.crc import crc32_word
+from bubble_protocol.crc import crc32_on
 from bubble_protocol.portable import micropython, ptr16
 
 KNOTS_MAX = 64
@@ -42,11 +42,17 @@ class Tables:
         self.sizes = array("i", bytearray(4 * bubbles))
         self.crc = 0  # made once by `swap`: handing on an integer, however long, allocates nothing
         self._received = bytearray(len(self.knots))
+        self._crc = array("i", (0,))
         self._received_sizes = array("i", bytearray(4 * bubbles))
-        for bubble in range(bubbles):
+        self.use_nominal()
+
+    def use_nominal(self):
+        """Use the table of the bubble as the paper measured it, for all."""
+        for bubble in range(self.bubbles):
             self.write_size(bubble, len(NOMINAL))
-            for index, (height, pressure) in enumerate(NOMINAL):
-                self.write_knot(bubble, index, height, pressure)
+            for index in range(len(NOMINAL)):
+                knot = NOMINAL[index]
+                self.write_knot(bubble, index, knot[0], knot[1])
         self.swap()
 
     def write_size(self, bubble, size):
@@ -102,11 +108,16 @@ class Tables:
 
     def received_crc(self):
         """CRC-32 of the received set, as a signed word: per bubble its knots as (u16 µm, u16 Pa)."""
-        packed = bytearray()
+        self._crc[0] = 0
         for bubble in range(self.bubbles):
             start = bubble * KNOTS_MAX * KNOT_BYTES
-            packed += self._received[start : start + self._received_sizes[bubble] * KNOT_BYTES]
-        return crc32_word(packed, 0, len(packed))
+            crc32_on(self._received, start, start + self._received_sizes[bubble] * KNOT_BYTES, self._crc)
+        return self._crc[0]
+
+    def forget(self):
+        """Drop what has been received; what is received next starts from a copy of what is in use."""
+        self._received[:] = self.knots
+        self._received_sizes[:] = self.sizes
 
     def swap(self):
         """Use the received set; what is received next starts from a copy of it."""

@@ -19,6 +19,7 @@ from bubbleskin.errors import (
 from bubbleskin.layout import Layout
 from bubbleskin.records import Health, Info, State
 from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.stored import Figures, StoreInfo
 
 if TYPE_CHECKING:
     from bubbleskin.physics import (
@@ -61,6 +62,7 @@ __all__ = [
     "DeviceRefused",
     "DeviceRestarted",
     "DeviceSilent",
+    "Figures",
     "Health",
     "Info",
     "InvalidInput",
@@ -72,6 +74,7 @@ __all__ = [
     "Overtaken",
     "Skin",
     "State",
+    "StoreInfo",
     "Table",
     "WrongDevice",
     "YeohBalloon",

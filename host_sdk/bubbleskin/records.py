@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from bubble_protocol import messages
 from bubbleskin.link.wire import SCHEMA_CRC, Received
+from bubbleskin.stored import SOURCES
 
 _MODES = {number: name for number, name, _ in messages.MODES}
 _STATUSES = {number: name for number, name, _ in messages.STATUSES}
 _SELF_TESTS = {number: name for number, name, _ in messages.SELF_TESTS}
-_TRANSLATED = {"mode", "board_faults", "self_test", "untrue_zero", "unfilled", "unvented"}
+_TRANSLATED = {"mode", "board_faults", "self_test", "untrue_zero", "unfilled", "unvented", "store"}
 
 
 def _bits(mask: int) -> tuple[int, ...]:
@@ -90,6 +91,8 @@ class Health:
     """Bubbles that a fill pulse did not reach."""
     unvented: tuple[int, ...]
     """Bubbles that did not vent."""
+    store: str
+    """Where the tables came from: slot_a, slot_b; or factory, damaged, foreign, none, see `StoreInfo.source`."""
 
     @classmethod
     def of(cls, reply: Received, tick: float) -> Self:
@@ -106,6 +109,7 @@ class Health:
             untrue_zero=_bits(reply["untrue_zero"]),
             unfilled=_bits(reply["unfilled"]),
             unvented=_bits(reply["unvented"]),
+            store=SOURCES.get(reply["store"], "unknown"),
             **same,
         )
 

@@ -16,6 +16,7 @@ from bubbleskin.link.transport import Transport
 from bubbleskin.link.wire import Received, crc32
 from bubbleskin.records import Health, Info, State, TickHistogram
 from bubbleskin.shape.heightfield import Heights, sample
+from bubbleskin.stored import Figures, StoreInfo
 
 if TYPE_CHECKING:
     from bubbleskin.physics.calibration import Calibration
@@ -164,7 +165,7 @@ class AsyncSkin:
         """See `Skin.clear_faults`."""
         await self._link.call("CLEAR")
 
-    async def upload_tables(self, tables: "Sequence[Table] | Table | Calibration") -> None:
+    async def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
         """See `Skin.upload_tables`."""
         from bubbleskin.physics.calibration import Calibration
 
@@ -189,6 +190,30 @@ class AsyncSkin:
         reply = await self._link.call("TABLE_COMMIT", (crc,))
         if reply["tables_crc"] != crc:
             raise DeviceRefused("The wristband uses other tables than were sent. Upload them again.")
+        if save:
+            await self.save()
+
+    async def figures(self) -> Figures:
+        """See `Skin.figures`."""
+        return Figures.of(await self._link.call("FIGURES_READ"))
+
+    async def upload_figures(self, figures: Figures, save: bool = False) -> None:
+        """See `Skin.upload_figures`."""
+        await self._link.call("FIGURES_WRITE", (), figures.rows(self.info.bubbles))
+        if save:
+            await self.save()
+
+    async def save(self) -> StoreInfo:
+        """See `Skin.save`."""
+        return StoreInfo.of(await self._link.call("STORE_SAVE"))
+
+    async def stored(self) -> StoreInfo:
+        """See `Skin.stored`."""
+        return StoreInfo.of(await self._link.call("STORE_INFO"))
+
+    async def factory_reset(self) -> StoreInfo:
+        """See `Skin.factory_reset`."""
+        return StoreInfo.of(await self._link.call("STORE_RESET"))
 
     async def read_tables(self) -> "list[Table]":
         """See `Skin.read_tables`."""
@@ -304,12 +329,37 @@ class Skin:
         """Forget all faults, the board's too; what still is wrong faults again."""
         drive(self._skin.clear_faults())
 
-    def upload_tables(self, tables: "Sequence[Table] | Table | Calibration") -> None:
+    def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
         """Use other height to pressure tables, until the device restarts; all or none are taken.
 
-        `tables`: one per bubble in layout order, one for all, or a calibration of this kind of board.
+        `tables`: one per bubble in layout order, one for all, or a calibration of this kind of board. With `save` they are
+        kept for good, see there.
         """
-        drive(self._skin.upload_tables(tables))
+        drive(self._skin.upload_tables(tables, save))
+
+    def figures(self) -> Figures:
+        """What sets each bubble apart besides its table: sensor zero, dead times, flow."""
+        return drive(self._skin.figures())
+
+    def upload_figures(self, figures: Figures, save: bool = False) -> None:
+        """Use other figures, until the device restarts; only while it is vented. With `save` they are kept for good."""
+        drive(self._skin.upload_figures(figures, save))
+
+    def save(self) -> StoreInfo:
+        """Keep the tables, figures and settings in use without power, for every start from now on; returns the store's state.
+
+        Only while vented: writing flash stops the device for some 0.1 s, and it would control nothing. If power fails
+        meanwhile, all is as it was before, or all is saved. What is saved already is not written again.
+        """
+        return drive(self._skin.save())
+
+    def stored(self) -> StoreInfo:
+        """The state of the store: where what is in use comes from, both slots, wear."""
+        return drive(self._skin.stored())
+
+    def factory_reset(self) -> StoreInfo:
+        """Forget what is stored and use what the firmware was made with; only while vented."""
+        return drive(self._skin.factory_reset())
 
     def read_tables(self) -> "list[Table]":
         """The tables in use, one per bubble."""

@@ -53,6 +53,23 @@ def crc32_into(buffer, start, end, out, at):
     _crc32_into(_TABLE, buffer, start, end, out, at)
 
 
+@micropython.viper
+def _crc32_on(table, buffer, start: int, end: int, word):
+    words = ptr32(table)
+    data = ptr8(buffer)
+    state = ptr32(word)
+    crc = ~state[0]
+    while start < end:
+        crc = (crc >> 8 & 0xFFFFFF) ^ words[(crc ^ data[start]) & 255]
+        start += 1
+    state[0] = ~crc
+
+
+def crc32_on(buffer, start, end, word):
+    """Go on with the CRC-32 in `word[0]`, of an `array('i')`, over `buffer[start:end]`; it begins at 0. Allocates nothing."""
+    _crc32_on(_TABLE, buffer, start, end, word)
+
+
 def crc32_word(buffer, start, end):
     """The same CRC as one signed word, the way `array('i')` holds it."""
     crc = bytearray(4)

@@ -15,11 +15,13 @@ REPLY = 0x80
 HELLO, PING, INFO, SHOW, STATE, SUBSCRIBE, TELEMETRY = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
 TABLE_WRITE, TABLE_COMMIT, TABLE_READ, STOP, VENT, CLEAR = 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D
 TICKS, RESTART = 0x0E, 0x0F
+STORE_SAVE, STORE_INFO, STORE_RESET, FIGURES_WRITE, FIGURES_READ = 0x16, 0x17, 0x18, 0x19, 0x1A
 ERROR = 0x7F
 
 # What ERROR says went wrong.
 UNKNOWN_MESSAGE, WRONG_LENGTH, OUT_OF_RANGE, WRONG_COUNT, BAD_TABLE, BAD_CRC, NO_COMMON_PROTOCOL, FAULTED = range(1, 9)
 BOARD_FAULT, OVERTAKEN = 9, 10
+NOT_VENTED, STORE_FOREIGN, STORE_FAILED = 15, 16, 17
 ERRORS = (
     (UNKNOWN_MESSAGE, "unknown_message", "no message has this id"),
     (WRONG_LENGTH, "wrong_length", "the payload is too short or too long: asked bytes, low to high allowed"),
@@ -31,11 +33,21 @@ ERRORS = (
     (FAULTED, "faulted", "the device failed at this request and vents"),
     (BOARD_FAULT, "board_fault", "a fault of the board forbids it: asked are its bits; mend the cause, then CLEAR"),
     (OVERTAKEN, "overtaken", "a later STOP, VENT or session came first: not applied, and never will be"),
+    (NOT_VENTED, "not_vented", "allowed only while all bubbles are vented: asked is the mode; VENT first"),
+    (
+        STORE_FOREIGN,
+        "store_foreign",
+        "a slot holds what newer firmware or another board has stored, and is left alone until STORE_RESET",
+    ),
+    (STORE_FAILED, "store_failed", "flash does not hold what was written, or there is none; what was stored still is"),
 )
 
 # Bits of `capabilities`.
-DELIVERY = 1
-CAPABILITIES = ((DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),)
+DELIVERY, STORE = 1, 4
+CAPABILITIES = (
+    (DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),
+    (STORE, "store", "tables, settings and figures can be stored"),
+)
 
 # What the board as a whole is doing.
 VENTED, ACTIVE, HOLDING = range(3)
@@ -90,6 +102,27 @@ SELF_TESTS = (
     (SKIPPED, "skipped", "valves not tested: no supply pressure, an emergency stop, or a SHOW came first"),
 )
 
+# Where the tables, settings and figures in use at boot came from.
+FACTORY, SLOT_A, SLOT_B, DAMAGED, FOREIGN, NO_STORE = range(6)
+STORES = (
+    (FACTORY, "factory", "nothing is stored: what the firmware was made with"),
+    (SLOT_A, "slot_a", "the first slot"),
+    (SLOT_B, "slot_b", "the second slot"),
+    (DAMAGED, "damaged", "something was stored and cannot be used: what the firmware was made with"),
+    (FOREIGN, "foreign", "newer firmware or another board has stored something: what the firmware was made with"),
+    (NO_STORE, "none", "this board has no store: what the firmware was made with"),
+)
+
+# What one slot of the store holds.
+BLANK, WHOLE, TORN, OTHER, UNFIT = range(5)
+SLOTS = (
+    (BLANK, "blank", "nothing, or a save that was cut short"),
+    (WHOLE, "whole", "a record whose CRC is right"),
+    (TORN, "torn", "no whole record: a save was cut short, or flash has lost bits"),
+    (OTHER, "other", "a record of newer firmware or of another board: left alone"),
+    (UNFIT, "unfit", "a whole record that the board's limits do not allow"),
+)
+
 # What RESTART leads to.
 FIRMWARE, BOOT_LOADER, PROMPT = range(3)
 RESTARTS = (
@@ -109,6 +142,33 @@ _BUBBLES = (
 _KNOTS = (
     ("knot_um", U16, "µm", 1, None, "height of a knot"),
     ("knot_pa", U16, "Pa", None, None, "gauge pressure that holds it"),
+)
+
+_FIGURES = (
+    ("zero", U16, "counts", None, None, "what the sensor reads at no pressure"),
+    ("opens_us", U16, "µs", None, None, "from current to an open valve"),
+    ("closes_us", U16, "µs", None, None, "from no current to a closed valve"),
+    ("flow_gain", U16, "", None, None, "flow of the restrictor: root of pressures (8 Pa) to µJ/ms, /65536"),
+)
+_STORE = (
+    ("source", U8, "", None, None, "see store"),
+    ("generation", U16, "", None, None, "number of the record in use, 65535 is followed by 0; 0 also without one"),
+    ("schema", U8, "", None, None, "version of its format"),
+    ("slot_a", U8, "", None, None, "see slot"),
+    ("slot_b", U8, "", None, None, "see slot"),
+    ("wear_a", U32, "erases", None, None, "of the first slot's sectors, at least"),
+    ("wear_b", U32, "erases", None, None, "of the second slot's"),
+    ("size", U16, "bytes", None, None, "of the record in use"),
+    ("capacity", U16, "bytes", None, None, "of a slot"),
+    (
+        "tables_crc",
+        U32,
+        "",
+        None,
+        None,
+        "CRC-32 of the tables stored; those in use are others while they are not saved",
+    ),
+    ("error", U8, "", None, None, "why the last save was refused, see errors; 0: it was not"),
 )
 
 # (id, name, fixed fields, repeated fields, meaning)
@@ -181,6 +241,7 @@ MESSAGES = (
             ("untrue_zero", U32, "", None, None, "bubbles, as bits, whose sensor was off or silent without pressure"),
             ("unfilled", U32, "", None, None, "bubbles, as bits, that a fill pulse did not reach"),
             ("unvented", U32, "", None, None, "bubbles, as bits, that did not vent"),
+            ("store", U8, "", None, None, "see store"),
         ),
         (),
         "counters and health",
@@ -305,6 +366,22 @@ MESSAGES = (
         "vent and start again; answered first",
     ),
     (RESTART | REPLY, "RESTART_REPLY", (_TICKS,), (), "restarting"),
+    (STORE_SAVE, "STORE_SAVE", (), (), "store tables, settings and figures in use; only while vented"),
+    (STORE_SAVE | REPLY, "STORE_SAVE_REPLY", _STORE, (), "stored; what was stored already is not written again"),
+    (STORE_INFO, "STORE_INFO", (), (), "what is stored?"),
+    (STORE_INFO | REPLY, "STORE_INFO_REPLY", _STORE, (), "the state of the store"),
+    (
+        STORE_RESET,
+        "STORE_RESET",
+        (),
+        (),
+        "use what the firmware was made with, and store nothing else; only while vented",
+    ),
+    (STORE_RESET | REPLY, "STORE_RESET_REPLY", _STORE, (), "as it was made"),
+    (FIGURES_WRITE, "FIGURES_WRITE", (), _FIGURES, "use these figures, one entry per bubble; only while vented"),
+    (FIGURES_WRITE | REPLY, "FIGURES_WRITE_REPLY", (_TICKS,), (), "figures in use"),
+    (FIGURES_READ, "FIGURES_READ", (), (), "what figures are in use?"),
+    (FIGURES_READ | REPLY, "FIGURES_READ_REPLY", (), _FIGURES, "the figures in use, one entry per bubble"),
     (
         ERROR,
         "ERROR",

@@ -11,6 +11,7 @@ SCRIPT = """
 import gc, micropython
 from bubble_firmware import boards
 from bubble_firmware.app import App
+from bubble_firmware.drivers.flash import Memory
 
 class Hands:
     # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick.
@@ -29,6 +30,7 @@ class Hands:
         self.fills = self.vents = self.rests = self.sent = 0
         self.broken = False
         self.safe = 0
+        self.flash = Memory(16384)
 
     def sense(self, counts):
         if self.broken:
@@ -118,6 +120,7 @@ gc.disable()
 grown = measure(app, hands)
 decoder = app.session._decoder
 print(grown, app.exceptions, decoder.good, hands.sent, hands.fills, hands.vents, hands.rests)
+print(app.store.wear[0], app.store.wear[1])
 
 exceptions = app.exceptions
 hands.broken = True
@@ -127,12 +130,15 @@ print(measure(app, hands), app.exceptions - exceptions, hands.safe)
 
 ACTIVE = ("SUBSCRIBE", "SHOW up", "STATE", "PING", "INFO", "SHOW down", "PING", "STATE", "INFO")
 OUT_OF_ORDER = ("SUBSCRIBE", "SHOW up", "STATE", "INFO", "SHOW down", "STATE", "STOP ahead", "STATE")
+SAVING = ("FIGURES_WRITE", "STORE_SAVE", "FIGURES_READ", "FIGURES other", "STORE_SAVE", "STORE_INFO")
 SEQUENCES = [
     pytest.param(ACTIVE, id="active"),
     pytest.param(("SHOW up", "HELLO", "STOP", "SHOW down", "VENT", "CLEAR", "TABLE_READ"), id="everything"),
     pytest.param(("SHOW up", "garbage", "too high", "wrong count", "wrong length", "unknown"), id="refused"),
     pytest.param(("TABLE_WRITE", "SHOW up", "STATE"), id="tables"),
     pytest.param(OUT_OF_ORDER, id="out of order, twice, overtaken"),
+    pytest.param(("STORE_INFO", "FIGURES_READ", "SHOW up", "STORE_SAVE", "FIGURES_WRITE"), id="store"),
+    pytest.param(SAVING, id="saving"),
 ]
 SESSIONS = 17
 """One more than the device remembers: the first may come again after the last."""
@@ -159,6 +165,8 @@ def request(name, n, number, session):
         "SUBSCRIBE": lambda: of("SUBSCRIBE", (20000 // boards.load(f"wristband{n}").TICK_US,)),  # 50 Hz
         "TABLE_READ": lambda: of("TABLE_READ", (1, 10)),
         "TABLE_WRITE": lambda: of("TABLE_WRITE", (1, 4, 60), [(9000, 65535)] * 40),
+        "FIGURES_WRITE": lambda: of("FIGURES_WRITE", (), [(170, 1100, 900, 4000)] * n),
+        "FIGURES other": lambda: of("FIGURES_WRITE", (), [(150, 1300, 1100, 3900)] * n),
         "garbage": lambda: bytes(range(1, 200)) + b"\0",
         "too high": lambda: of("SHOW", (0,), [(15000,)] * n),
         "wrong count": lambda: of("SHOW", (0,), [(9000,)] * (n + 1)),
@@ -191,16 +199,21 @@ def rounds(sequence, n):
 def test_the_tick_allocates_nothing(micropython, board, sequence):
     n = boards.load(board).BUBBLES
     requests = b"".join(rounds(sequence, n))
-    said, failing = micropython(
-        SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=17, ticks=4000)
+    ticks = 600 if sequence == SAVING else 4000
+    said, wear, failing = micropython(
+        SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=17, ticks=ticks)
     ).splitlines()
     grown, exceptions, good, sent, fills, vents, rests = map(int, said.split())
     assert exceptions == 0, "MemoryError while the heap was locked"
     assert grown == 0
-    assert good > 500
-    assert sent > 500
+    assert good > ticks // 8
+    assert sent > ticks // 8
     # Nor when every tick fails: what makes the outputs safe must not need memory, for that may be what failed.
-    assert failing == "0 4000 4000"
+    grown, exceptions, safe = map(int, failing.split())
+    assert (grown, exceptions) == (0, ticks)
+    assert safe >= ticks
+    if sequence == SAVING:
+        assert min(map(int, wear.split())) > 5, "flash was written, both slots in turn"
     if sequence == ACTIVE:
         assert sent > good, "telemetry and every reply"
         assert min(fills, vents, rests) > 4000 * n // 20, "valves of both kinds are at work"

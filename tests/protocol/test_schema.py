@@ -79,6 +79,8 @@ def test_names_of_fields_are_unique_in_a_message():
         ("TELEMETRY", BUBBLES),
         ("TABLE_WRITE", 48),
         ("TABLE_READ_REPLY", 48),
+        ("FIGURES_WRITE", BUBBLES),
+        ("FIGURES_READ_REPLY", BUBBLES),
     ],
 )
 def test_a_frame_has_room_for_every_bubble(name, entries):
@@ -99,15 +101,19 @@ def test_telemetry_is_an_unasked_state():
 
 
 @pytest.mark.parametrize(
-    "table", [messages.ERRORS, messages.MODES, messages.STATUSES], ids=["errors", "modes", "statuses"]
+    "table",
+    [messages.ERRORS, messages.MODES, messages.STATUSES, messages.STORES, messages.SLOTS],
+    ids=["errors", "modes", "statuses", "stores", "slots"],
 )
 def test_an_enumeration_counts_on(table):
     first = table[0][0]
     assert first in (0, 1)
-    assert [entry[0] for entry in table] == list(range(first, first + len(table)))
+    numbers = [entry[0] for entry in table]
+    assert numbers == (sorted(set(numbers)) if table is messages.ERRORS else list(range(first, first + len(table))))
     assert len({entry[1] for entry in table}) == len(table)
     for number, name, meaning in table:
-        assert getattr(messages, name.upper()) == number
+        constant = "NO_STORE" if name == "none" else name.upper()
+        assert getattr(messages, constant) == number
         assert meaning
 
 

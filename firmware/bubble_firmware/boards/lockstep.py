@@ -3,12 +3,17 @@
 All words are little-endian and blocks have a fixed size, the link's bytes at their end:
     into the firmware, per tick: u16 size of the link's bytes, u16 counts (per bubble, then the supply's), LINK_IN bytes
     out of it, per tick: u16 size of the link's bytes, u16 pulses (fill and vent per bubble), u16 pump, u16 dump, LINK_OUT bytes
+A size of 0xFFFF into the firmware has no answer: power fails and comes back.
 """
 
 import sys
 
+from bubble_firmware.drivers.flash import SECTOR, Memory
+
 LINK_IN = 256
 LINK_OUT = 1024
+RESET = 0xFF
+_FLASH = 4 * SECTOR
 
 
 class Hands:
@@ -21,6 +26,9 @@ class Hands:
 
     def __init__(self, bubbles, boot_id):
         self.boot_id = boot_id
+        self.flash = Memory(_FLASH)
+        self.ended = False
+        self._restarting = False
         self._stdin = sys.stdin.buffer
         self._stdout = sys.stdout.buffer
         self._in = bytearray(2 + 2 * (bubbles + 1) + LINK_IN)
@@ -31,14 +39,21 @@ class Hands:
         self._ticked = False
 
     def wait(self):
-        """Hand over what the last tick decided and wait for the next; False when the pipe has closed."""
+        """Hand over what the last tick decided and wait for the next; False for a restart or when the pipe has closed."""
         if self._ticked:
             out = self._out
             _put(out, 0, self._sent)
             self._stdout.write(out)
             self._sent = 0
-        self._ticked = True
-        return self._stdin.readinto(self._in) == len(self._in)  # type: ignore[union-attr]
+        if not self._restarting:
+            self.ended = self._stdin.readinto(self._in) != len(self._in)  # type: ignore[union-attr]
+            self._restarting = self._in[0] == RESET and self._in[1] == RESET
+        self._ticked = not self._restarting
+        if self._restarting:
+            self._restarting = False
+            self.boot_id += 1
+            return False
+        return not self.ended
 
     def sense(self, counts):
         """Fill in the counts of this tick."""
@@ -100,7 +115,8 @@ class Hands:
         """The interpreter collects by itself."""
 
     def restart(self, into):
-        """There is nothing to start again from."""
+        """Start again when this tick has been handed over; flash stays as it is."""
+        self._restarting = True
 
     def phase_us(self):
         """Time stands still within a tick."""

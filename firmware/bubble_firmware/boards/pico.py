@@ -12,15 +12,19 @@ import time
 from array import array
 
 import machine
+import vfs
 from machine import ADC, I2C, SPI, WDT, Pin
 
 from bubble_firmware.drivers import clock, mcp3208, pca9685, pwm, watchdog
+from bubble_firmware.drivers.flash import Files, Sectors
 from bubble_firmware.drivers.led import show as show_led
 from bubble_firmware.drivers.usb_serial import UsbSerial
 from bubble_firmware.drivers.watchdog import feed
 from bubble_protocol import messages
 
 _WATCHDOG_MS = 80
+_FLASH_MS = 2000  # longer than the slowest erase
+_ROM_SEGMENT = 2  # of `vfs.rom_ioctl`
 _SPI_HZ = 2000000
 _I2C_HZ = 1000000
 _I2C_TIMEOUT_US = 2000  # a stuck bus costs so much, once
@@ -69,6 +73,11 @@ class Hands:
         self._link = UsbSerial()
         self.receive = self._link.receive
         self.send = self._link.send
+        # Our own UF2 has flash for the store, see micropython.cmake. Another MicroPython has files.
+        if hasattr(vfs, "rom_ioctl"):
+            self.flash: "Sectors | Files" = Sectors(vfs.rom_ioctl(_ROM_SEGMENT, 0), _be_patient)
+        else:
+            self.flash = Files(_be_patient)
         self._running = False
         self._slack = True
         self._began = array("i", (0,))
@@ -168,6 +177,11 @@ class Hands:
     def phase_us(self):
         """Since this tick's period began."""
         return pwm.elapsed(_TIMER, self._began)
+
+
+def _be_patient():
+    """Flash keeps everything waiting: until the next tick the watchdog waits, too."""
+    feed(_FLASH_MS)
 
 
 class PwmValves:

@@ -34,6 +34,12 @@ STOCK = "stock"
 CHIP = "RPI_PICO"
 """MicroPython's own name of the board that carries the RP2040."""
 
+MODULES = "micropython.cmake"
+"""What gives the store its flash, beside the manifest."""
+
+IMAGE_MAX = (2048 - 1408 - 32) * 1024
+"""Bytes of a Pico's flash up to the store, which lies before MicroPython's file system."""
+
 KEPT = 8  # UF2s of one board: several checkouts may share the cache
 COMPILER = "arm-none-eabi-gcc"
 FLASH_BASE, FLASH_FAMILY = 0x10000000, 0xE48BFF56  # where a UF2 for the RP2040 goes, and its family id
@@ -92,7 +98,8 @@ def folder() -> Path:
 
 def device_files() -> dict[str, bytes]:
     """Every file that is frozen, by its path in the staging folder, and the manifest that names them."""
-    files = {"firmware/manifest.py": manifest().read_bytes(), "manifest.py": MANIFEST.encode()}
+    files = {f"firmware/{name}": beside_firmware(name).read_bytes() for name in ("manifest.py", MODULES)}
+    files["manifest.py"] = MANIFEST.encode()
     for room, package in (("protocol", bubble_protocol), ("firmware", bubble_firmware)):
         top = Path(package.__path__[0])
         for path in sorted(top.rglob("*.py")):
@@ -100,10 +107,10 @@ def device_files() -> dict[str, bytes]:
     return files
 
 
-def manifest() -> Path:
-    """`firmware/manifest.py`: beside the firmware in a checkout, with this module in an installed wheel."""
-    beside = Path(bubble_firmware.__path__[0]).parent / "manifest.py"
-    return beside if beside.is_file() else Path(__file__).with_name("manifest.py")
+def beside_firmware(name: str) -> Path:
+    """`firmware/NAME`: beside the firmware in a checkout, with this module in an installed wheel."""
+    beside = Path(bubble_firmware.__path__[0]).parent / name
+    return beside if beside.is_file() else Path(__file__).with_name(name)
 
 
 def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
@@ -226,9 +233,11 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, ste
         **settings,
     )
     cores = f"-j{os.cpu_count() or 1}"
+    frozen = stage(home, board, files)
     options = {
         "MICROPY_BOARD": CHIP,
-        "MICROPY_FROZEN_MANIFEST": str(stage(home, board, files)),
+        "MICROPY_FROZEN_MANIFEST": str(frozen),
+        "USER_C_MODULES": str(frozen.with_name("firmware") / MODULES),
         "PICO_NO_PICOTOOL": "1",
         "Python3_EXECUTABLE": os.path.realpath(sys.executable),  # one virtual environment is as good as another
     }
@@ -241,6 +250,11 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, ste
         steps.run("Configuring", configure, env=env)
         stamp.write_text(repr((configure, flags)))
     steps.run(f"Compiling {board}", ["ninja", f"-C{build}", cores], env=env)
+    size = (build / "firmware.bin").stat().st_size
+    if size > IMAGE_MAX:
+        raise BubbleskinError(
+            f"The firmware of {board} has {size} bytes; {IMAGE_MAX} are before the wristband's store."
+        )
     uf2 = build / "firmware.uf2"
     uf2.unlink(missing_ok=True)
     place = ["-b", hex(FLASH_BASE), "-f", hex(FLASH_FAMILY), "-c", "-o", uf2, build / "firmware.bin"]

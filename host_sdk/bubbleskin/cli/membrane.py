@@ -105,12 +105,13 @@ def fit(
 @click.option("--bubbles", type=int, default=7, show_default=True, help="How many equal tables to make.")
 @click.option("-o", "--output", type=DATA, help="Write a calibration file.")
 @click.option("--upload", is_flag=True, help="Let the wristband use these tables, until it restarts.")
+@click.option("--save", is_flag=True, help="With --upload: for good. The wristband must be vented.")
 @device
 @json_option
 def table(
     board: str, knots: int, up_to_mm: float, data: Path | None, show: Path | None, from_device: bool,
-    compare: Path | None, bubbles: int, output: Path | None, upload: bool, device: str | None, as_json: bool,
-    preset: str, **options: Any,
+    compare: Path | None, bubbles: int, output: Path | None, upload: bool, save: bool, device: str | None,
+    as_json: bool, preset: str, **options: Any,
 ) -> None:  # fmt: skip
     """Make the tables that the firmware runs on: height to pressure, one per bubble.
 
@@ -118,6 +119,8 @@ def table(
     """
     from bubbleskin.physics import Calibration
 
+    if save and not upload:
+        raise InvalidInput("--save goes with --upload: it keeps the tables that are uploaded.")
     if (show is not None) + (data is not None) + from_device > 1:
         raise InvalidInput("The tables can come from one place: --data, --show or --from-device.")
     if show:
@@ -140,8 +143,9 @@ def table(
         click.echo(f"wrote {output}", err=True)
     if upload:
         with connect(device) as skin:
-            skin.upload_tables(calibration)
-        click.echo(f"{calibration.board} uses these tables, CRC {calibration.crc32:08x}, until it restarts", err=True)
+            skin.upload_tables(calibration, save)
+        until = "from now on" if save else "until it restarts"
+        click.echo(f"{calibration.board} uses these tables, CRC {calibration.crc32:08x}, {until}", err=True)
     if compare:
         differences = calibration.differences(Calibration.load(compare))
         click.echo("\n".join(differences) or "no difference")

@@ -152,6 +152,18 @@ def explain(error: Received) -> str:
         return f"The wristband refused {name}: {'; '.join(faults)}. Mend the cause, then `clear_faults()`."
     if code == messages.OVERTAKEN:
         return f"The wristband refused {name}: a later STOP or VENT has overtaken it. It was not applied."
+    if code == messages.NOT_VENTED:
+        modes = {number: mode for number, mode, _ in messages.MODES}
+        return (
+            f"The wristband refused {name} because it is {modes.get(asked, 'busy')}, not vented. Call `vent()` first."
+        )
+    if code == messages.STORE_FOREIGN:
+        return (
+            f"The wristband refused {name}: its store holds what newer firmware or another board has saved. "
+            "Update the firmware, or give that up with `factory_reset()`."
+        )
+    if code == messages.STORE_FAILED:
+        return f"The wristband refused {name}: its flash does not hold what was written, or it has none for a store."
     if code == messages.UNKNOWN_MESSAGE:
         return f"The wristband does not know {name}: its firmware is older than this SDK. Update the firmware."
     return f"The wristband refused {name} with error {code}."

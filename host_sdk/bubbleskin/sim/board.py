@@ -13,6 +13,7 @@ from bubble_firmware.app import App
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.shape.contact import CompliantContact
+from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.plant import Plant, PlantParameters
 
 BOARDS = ("wristband7", "wristband19")
@@ -38,8 +39,8 @@ class Firmware(Protocol):
     def tick(self, counts: array, link: bytes) -> Outputs:
         """One period: sensor counts (the supply's last) and bytes of the link in, decisions out."""
 
-    def reset(self, boot_id: int) -> None:
-        """Start it again, as after a power failure."""
+    def reset(self) -> None:
+        """Power fails and comes back: start again, with what flash holds."""
 
     def close(self) -> None:
         """End it."""
@@ -53,8 +54,11 @@ class InProcessFirmware:
     boot_faults = 0
     self_test = False
 
-    def __init__(self, board: ModuleType, boot_id: int):
+    def __init__(self, board: ModuleType, boot_id: int, flash: NorFlash | None = None):
+        self.boot_id = boot_id
+        self.flash = flash or NorFlash()
         self._board = board
+        self._restarting = False
         self._counts = array("H", bytes(2 * (board.BUBBLES + 1)))
         self._pulses = array("H", bytes(4 * board.BUBBLES))
         self._tick_us = board.TICK_US
@@ -62,7 +66,7 @@ class InProcessFirmware:
         self._dump = False
         self._in = b""
         self._out = bytearray()
-        self.reset(boot_id)
+        self.app = App(board, self)
 
     def tick(self, counts: array, link: bytes) -> Outputs:
         """See `Firmware`."""
@@ -70,11 +74,14 @@ class InProcessFirmware:
         self._in = link
         self._out.clear()
         self.app.tick()
+        if self._restarting:
+            self.reset()
         return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
 
-    def reset(self, boot_id: int) -> None:
+    def reset(self) -> None:
         """See `Firmware`."""
-        self.boot_id = boot_id
+        self._restarting = False
+        self.boot_id += 1
         self.app = App(self._board, self)
 
     def close(self) -> None:
@@ -118,7 +125,8 @@ class InProcessFirmware:
         """The interpreter collects by itself."""
 
     def restart(self, into: int) -> None:
-        """There is nothing to start again from."""
+        """Start again after this tick; there is no other boot loader or prompt."""
+        self._restarting = True
 
     def phase_us(self) -> int:
         """Time stands still within a tick."""
@@ -132,7 +140,7 @@ class SimulatedBoard:
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
     reservoir starts full, as on a board that has been powered for a while. `contact`: whether bubbles push each
     other, as real ones do; without it each is alone, which shows what the control law itself does. `firmware`: what
-    runs the firmware; None is this interpreter.
+    runs the firmware; None is this interpreter, with `flash` for its store.
     """
 
     def __init__(
@@ -143,6 +151,7 @@ class SimulatedBoard:
         spread: float = 0.0,
         contact: bool = True,
         firmware: Firmware | None = None,
+        flash: NorFlash | None = None,
     ):
         self.data = load_board(name)
         if not (math.isfinite(spread) and 0 <= spread <= 0.5):
@@ -153,9 +162,7 @@ class SimulatedBoard:
         self.name = name
         self.tick_s: float = self.data.TICK_US * 1e-6
         self.plant = make_plant(name, n, seed, spread, contact)
-        self._boots = 0
-        self._seed = seed
-        self.firmware = firmware or InProcessFirmware(self.data, boot_id=seed + 1)
+        self.firmware = firmware or InProcessFirmware(self.data, seed + 1, flash)
         self.to_device = bytearray()
         self.from_device = bytearray()
         self.pulses = np.zeros((n, 2))
@@ -201,19 +208,17 @@ class SimulatedBoard:
         self._pump = outputs.pump / 65535
         self._dump = outputs.dump
 
+    def reset(self) -> None:
+        """Power fails and comes back: the firmware starts again, with what flash holds; bytes under way are lost."""
+        self.to_device.clear()
+        self.from_device.clear()
+        self.pulses[:] = 0.0, self.tick_s
+        self._pump, self._dump, self._decided = 0.0, False, None
+        self.firmware.reset()
+
     def inject(self, fault: str, bubble: int, value: float = 1.0) -> None:
         """Give a bubble a fault, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 takes it away."""
         self.plant.inject(fault, bubble, value)
-
-    def reset(self) -> None:
-        """Start the firmware again, as after a power failure: it vents, and bytes under way are lost. The plant goes on."""
-        self._boots += 1
-        self.to_device.clear()
-        self.from_device.clear()
-        self.firmware.reset((self._seed + 1 + self._boots * 0x9E3779B1) & 0x3FFFFFFF)
-        self._decided = None
-        self.pulses[:, 0], self.pulses[:, 1] = 0.0, self.tick_s
-        self._pump, self._dump = 0.0, False
 
     def close(self) -> None:
         """End the firmware."""

@@ -11,13 +11,13 @@ from types import ModuleType
 
 import bubble_firmware
 import bubble_protocol
-from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT
+from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT, RESET
 from bubbleskin.errors import LinkError
 from bubbleskin.interpreter import find_micropython
 from bubbleskin.sim.board import Outputs
 
-HEAP = "190k"
-"""As much as is free for the firmware on a Pico, or less."""
+HEAP = "206k"
+"""As much as is free for the firmware on a Pico, or less, and the 16 kB that stand for its flash."""
 
 _PATIENCE = 10.0  # wall seconds for one tick, which takes well under a millisecond
 
@@ -38,11 +38,6 @@ class MicroPythonFirmware:
     """A `Firmware` in another process, talked to through `bubble_firmware.boards.lockstep`."""
 
     def __init__(self, board: ModuleType, boot_id: int):
-        self._board = board
-        self._start(boot_id)
-
-    def _start(self, boot_id: int) -> None:
-        board = self._board
         interpreter = find_micropython()
         program = _PROGRAM.format(path=source_path(), board=board.NAME, boot_id=boot_id)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has died
@@ -64,12 +59,7 @@ class MicroPythonFirmware:
 
     def tick(self, counts: array, link: bytes) -> Outputs:
         """See `Firmware`."""
-        block = len(link).to_bytes(2, "little") + counts.tobytes() + link.ljust(LINK_IN, b"\0")
-        try:
-            assert self._process.stdin is not None
-            self._process.stdin.write(block)
-        except OSError:
-            raise self._died() from None
+        self._write(len(link).to_bytes(2, "little") + counts.tobytes() + link.ljust(LINK_IN, b"\0"))
         answer = self._read()
         sent = int.from_bytes(answer[:2], "little")
         pulses = array("H", answer[2 : 2 + 4 * self._n])
@@ -79,10 +69,9 @@ class MicroPythonFirmware:
         at = self._size - LINK_OUT
         return Outputs(pulses, pump, bool(dump), answer[at : at + sent])
 
-    def reset(self, boot_id: int) -> None:
-        """See `Firmware`: another process."""
-        self.close()
-        self._start(boot_id)
+    def reset(self) -> None:
+        """See `Firmware`; flash is in the process, which goes on."""
+        self._write(bytes([RESET]) * (2 + 2 * (self._n + 1) + LINK_IN))
 
     def close(self) -> None:
         """End the process."""
@@ -96,6 +85,13 @@ class MicroPythonFirmware:
             self._process.kill()
             self._process.wait()
         self._errors.close()
+
+    def _write(self, block: bytes) -> None:
+        try:
+            assert self._process.stdin is not None
+            self._process.stdin.write(block)
+        except OSError:
+            raise self._died() from None
 
     def _read(self) -> bytes:
         pipe = self._process.stdout

@@ -2,10 +2,12 @@
 
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.flash import NorFlash
 
 
 class Board(Protocol):
@@ -100,15 +102,24 @@ class Options:
     spread: float = 0.0
     realtime: bool = False
     contact: bool = True
+    store: Path | None = None
+    """The file that keeps its flash."""
 
     @classmethod
     def parse(cls, options: dict[str, str], url: str) -> "Options":
         """From the URL's query; `InvalidInput` for what is not known or not a number."""
         values: dict[str, float] = {}
+        store = options.get("store")
+        if store is not None and not (store and url.startswith("sim:")):
+            raise InvalidInput(
+                f"{url} has store={store!r}; only sim:// keeps its store in a file: store=wristband.bin."
+            )
         for key, text in options.items():
             if key not in cls.__dataclass_fields__:
                 known = ", ".join(cls.__dataclass_fields__)
                 raise InvalidInput(f"{url} has the option {key!r}; known are {known}.")
+            if key == "store":
+                continue
             try:
                 values[key] = float(text) if key == "spread" else int(text)
             except ValueError:
@@ -119,6 +130,7 @@ class Options:
             values.get("spread", 0.0),
             bool(values.get("realtime", 0)),
             bool(values.get("contact", 1)),
+            Path(store) if store else None,
         )
 
 
@@ -138,7 +150,10 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Simulat
 
         firmware = MicroPythonFirmware(data, boot_id=chosen.seed + 1)
     try:
-        board = SimulatedBoard(name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, firmware=firmware)
+        flash = NorFlash(path=chosen.store) if chosen.store else None
+        board = SimulatedBoard(
+            name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, firmware=firmware, flash=flash
+        )
     except BaseException:
         if firmware:
             firmware.close()

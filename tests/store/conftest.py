@@ -1,0 +1,108 @@
+"""The store of a small board on simulated flash, and what an independent reader and writer make of its format."""
+
+import struct
+import sys
+import zlib
+from array import array
+from types import SimpleNamespace
+
+import pytest
+
+from bubble_firmware import boards, figures, record
+from bubble_firmware.bubbles import Bubbles
+from bubble_firmware.figures import Figures
+from bubble_firmware.store import Store
+from bubble_firmware.table import KNOTS_MAX, Tables
+from bubbleskin.sim.flash import NorFlash
+
+
+class Settings:
+    """What the store asks of settings: values, and whether some would be allowed."""
+
+    def __init__(self):
+        self.values = array("i", (250, 1000, -5))
+
+    def first_flaw(self, values):
+        return 0 if values[0] < 0 else -1
+
+
+def board(name="wristband7", bubbles=None):
+    data = SimpleNamespace(**{key: value for key, value in vars(boards.load(name)).items() if key.isupper()})
+    data.BUBBLES = bubbles or data.BUBBLES
+    return data
+
+
+class Device:
+    """As much of the firmware as the store deals with, booted from `flash`."""
+
+    def __init__(self, flash, data=None, settings=True):
+        self.board = data or board(bubbles=1)
+        self.tables = Tables(self.board.BUBBLES)
+        self.bubbles = Bubbles(self.board, self.tables)
+        self.figures = Figures(self.board, self.bubbles)
+        if settings:
+            self.settings = Settings()
+        self.store = Store(self, flash)
+
+    def change(self, number):
+        """Make everything in use tell of `number`, so that a mix of two would show."""
+        n = self.board.BUBBLES
+        for bubble in range(n):
+            size = 2 + (number + bubble) % (KNOTS_MAX - 1)
+            self.tables.write_size(bubble, size)
+            for knot in range(size):
+                height = 4000 + 10000 * knot // (size - 1)
+                self.tables.write_knot(bubble, knot, height, (number * 7 + bubble + knot) % 40000)
+        self.tables.swap()
+        self.figures.use(array("i", [160 + number % 80, 1000 + number % 999, 999, 4000] * n))
+        self.settings.values[:] = array("i", [number, 1000 + number, -number])
+        return self.content
+
+    @property
+    def content(self):
+        tables = [
+            self.tables.knots[4 * KNOTS_MAX * bubble :][: 4 * size].hex()
+            for bubble, size in enumerate(self.tables.sizes)
+        ]
+        found = array("i", bytes(4 * figures.COUNT * self.board.BUBBLES))
+        self.figures.read(found)
+        settings = self.settings.values.tolist() if hasattr(self, "settings") else []
+        return tuple(tables), tuple(found), tuple(settings)
+
+
+FACTORY_CONTENT = Device(None).content
+
+
+def sections_of(content):
+    """The sections of a record, with struct."""
+    tables, found, settings = content
+    knots = [bytes.fromhex(table) for table in tables]
+    parts = {
+        1: bytes(len(table) // 4 for table in knots) + b"".join(knots),
+        2: struct.pack(f"<{len(settings)}i", *settings),
+        3: struct.pack(f"<{len(found)}H", *found),
+    }
+    return {section: struct.pack("<BBH", section, 0, len(data)) + data for section, data in parts.items()}
+
+
+def make_record(sections, generation, wear=(1, 0), schema=record.SCHEMA, name="wristband7"):
+    """A whole record, with struct and zlib."""
+    body = b"".join(sections)
+    head = b"bsst" + struct.pack("<HHIII16s", schema, generation, 40 + len(body) + 4, *wear, name.encode())
+    head += struct.pack("<I", zlib.crc32(head))
+    return head + body + struct.pack("<I", zlib.crc32(head + body))
+
+
+def flash_with(a=b"", b=b""):
+    """Flash whose slots begin with these bytes."""
+    flash = NorFlash()
+    for slot, data in enumerate((a, b)):
+        start = slot * flash.size // 2
+        flash.image[start : start + len(data)] = data
+    return flash
+
+
+@pytest.fixture(scope="session")
+def kit():
+    """All of the above."""
+    return sys.modules[__name__]
