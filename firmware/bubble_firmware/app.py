@@ -86,9 +86,7 @@ class App:
         supply.sense(counts[bubbles.count])
         if hands.alarms or supply.lost:
             self._alarm(hands.alarms)
-        mode = self.mode
-        bubbles.sense(counts, supply.pressure_pa, mode)
-        bubbles.decide()
+        bubbles.step(counts, supply.pressure_pa, self.mode)
         if self.self_test.running:
             self._test()
         hands.act(bubbles.pulses, supply.pump, supply.dump)

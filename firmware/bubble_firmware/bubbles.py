@@ -5,42 +5,48 @@ The state is one array of integers, a row per bubble, laid out in `control`, whi
 
 from array import array
 
-from bubble_firmware import control
+from bubble_firmware import control, curve
 from bubble_firmware.table import KNOTS_MAX
 
 
 class Bubbles:
-    """The bubbles of `board`: `sense` and `decide` are the tick's two halves, `pulses` is what comes out of them."""
+    """The bubbles of `board`. `pulses` are fill and vent µs of every bubble in the next period.
+
+    `step(counts, supply_pa, mode)` is the work of one tick: sensor counts in, estimates and `pulses` out.
+    """
 
     def __init__(self, board, tables):
         n = board.BUBBLES
         self.count = n
         self.pulses = array("H", bytearray(4 * n))
-        self._rows = array("i", bytearray(4 * control.ROW * n))
-        self._board = array("i", bytearray(4 * control.BOARD))
+        curves = control.ROWS + control.ROW * n
+        state = array("i", bytearray(4 * (curves + control.KNOT * curve.KNOTS_MAX * n)))
+        view = memoryview(state)
+        self._board = state
+        self._rows = view[control.ROWS : curves]
+        self._curves = view[curves:]
         self._tables = tables
-        self._knots = tables.knots
-        k = self._board
+        self._dead = 64 * board.DEAD_VOLUME_MM3
+        k = state
         k[control.N] = n
         k[control.TICK_US] = board.TICK_US
         k[control.PA_PER_COUNT] = board.SENSOR_PA_PER_COUNT
         k[control.COUNT_LOW] = board.COUNT_LOW
         k[control.COUNT_HIGH] = board.COUNT_HIGH
-        k[control.DEAD_VOLUME] = 64 * board.DEAD_VOLUME_MM3
         k[control.REST_UM] = board.HEIGHT_REST_UM
         k[control.PRESSURE_MAX] = board.PRESSURE_MAX_PA
         k[control.FILL_MAX_US] = board.FILL_MAX_US
         k[control.PULSE_MIN_US] = board.PULSE_MIN_US
         k[control.QUIET_US] = board.QUIET_US
-        k[control.CRITICAL] = board.CRITICAL_RATIO
         k[control.TUBE] = board.TUBE_PA_PER_FLOW
         k[control.GAIN_P] = board.GAIN_P
         k[control.GAIN_I] = board.GAIN_I
         k[control.GAIN_D] = board.GAIN_D
         k[control.DEADBAND_UM] = board.DEADBAND_UM
         k[control.SETTLED_UM] = board.SETTLED_UM
-        k[control.KNOT_STRIDE] = 2 * KNOTS_MAX
         k[control.RAMP_DONE] = k[control.RAMP_TICKS] = 1
+        for index, root in enumerate(curve.roots(board.CRITICAL_RATIO)):
+            k[control.ROOTS + index] = root
         row = self._rows
         for at in range(0, n * control.ROW, control.ROW):
             row[at + control.ZERO] = board.SENSOR_ZERO
@@ -49,31 +55,35 @@ class Bubbles:
             row[at + control.FLOW_GAIN] = control.flow_gain(board)
             row[at + control.TARGET] = row[at + control.START] = board.HEIGHT_REST_UM
             row[at + control.HEIGHT] = row[at + control.SETPOINT] = board.HEIGHT_REST_UM << 4
-            row[at + control.ROOT] = 10000
+            row[at + control.WAIT] = -1
         self.use_tables()
         for at in range(0, n * control.ROW, control.ROW):
-            row[at + control.AIR] = row[at + control.HEIGHT + control.CONTENT]
+            row[at + control.AIR] = self._curves[row[at + control.FIRST] // 4 + control.A]
+
+        # Defaults are locals: an attribute costs the chip 2.5 µs.
+        def step(counts, supply_pa, mode, step=control.step, rows=row, state=state, pulses=self.pulses):
+            step(rows, state, counts, pulses, supply_pa, mode)
+
+        self.step = step
 
     def use_tables(self):
         """Take up the tables in use, after a commit. The air stays; what height it means is found anew."""
         row = self._rows
+        stride = control.KNOT * curve.KNOTS_MAX
         for i in range(self.count):
             at = i * control.ROW
-            row[at + control.KNOTS] = self._tables.sizes[i]
+            first = i * stride
+            size = curve.build(
+                self._curves, self._tables.knots, first, i * KNOTS_MAX, self._tables.sizes[i], self._dead
+            )
+            row[at + control.FIRST] = 4 * first
+            row[at + control.LAST] = 4 * (first + control.KNOT * (size - 2))
             row[at + control.LOWEST], row[at + control.HIGHEST] = self._tables.pressures(i)
-            for record in (at + control.HEIGHT, at + control.SETPOINT):
-                row[record + control.SEGMENT] = 0
-                row[record + control.WEIGHED] = -1
-        control.weigh(self._rows, self._board, self._tables.knots)
-
-    def sense(self, counts, supply_pa, mode):
-        """The tick's first half: sensor counts in, heights and air estimated."""
-        control.estimate(self._rows, self._board, self._knots, counts, supply_pa, mode)
-
-    def decide(self):
-        """The tick's second half: the setpoint moved on, `pulses` for the next period."""
-        control.weigh(self._rows, self._board, self._knots)
-        control.control(self._rows, self._board, self.pulses)
+            row[at + control.HEIGHT + control.SEGMENT] = row[at + control.SETPOINT + control.SEGMENT] = 4 * first
+            row[at + control.CALM] = 0
+        k = self._board
+        if k[control.RAMP_DONE] == k[control.RAMP_TICKS]:  # the setpoints' air is to be found again
+            k[control.RAMP_DONE] -= 1
 
     def show(self, values, first, ticks):
         """Ramp every bubble from where it is to the height (µm) in `values[first:]` within `ticks` ticks."""

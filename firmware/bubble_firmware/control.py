@@ -2,37 +2,41 @@
 """What is computed for every bubble in every tick: from sensor counts to the open times of its valves.
 
 The controlled quantity is *air*: the pV content of bubble and line in µJ (1 µJ = 1 kPa mm³, isothermal).
-Height is a single valued function of air even where pressure hardly changes with height, so
+Height is a single valued function of air even where pressure hardly changes with height, so `step`
 
-- `estimate` counts the air that the valves let through and corrects the count by the pressure sensor
-  whenever no air flows (an observer: predict by dose, correct by measurement),
-- `weigh` turns heights into pressure and air through the bubble's table,
-- `control` guards the limits and is an integer PID on the air that is missing, fed forward by the air that
-  the moving setpoint itself needs; it turns air into open time by the valve's flow and adds the dead times.
+- guards the limits,
+- counts the air that the valves let through and corrects the count by the pressure sensor whenever no air
+  flows (an observer: predict by dose, correct by measurement), through the bubble's curve, see `curve`,
+- is an integer PID on the air that is missing, fed forward by the air that the moving setpoint itself needs;
+  it turns air into open time by the valve's flow and adds the dead times.
 
-A command computed in one tick acts from the start of the next: the PWM hardware latches it there. All
-state is one array of 32-bit integers, a row per bubble; the functions are viper on the device and
-ordinary Python elsewhere, and compute the same integers. They allocate nothing. The pointers come first among
-their arguments because viper keeps the first three in registers.
+A bubble where nothing is under way is *calm*: it is guarded in every tick, but measured and decided upon in every
+fourth only, by the mean of four readings. Whatever asks something else of a bubble takes its calm away.
+
+A command computed in one tick acts from the start of the next: the PWM hardware latches it there. All state is
+one array of 32-bit integers, a row per bubble; the functions are viper on the device and ordinary Python
+elsewhere, and compute the same integers. They allocate nothing. What docs/micropython.md says of viper's speed
+decided how things are written here: two pointers first among the arguments, small offsets, signs tested as bits.
 """
 
 from bubble_protocol.portable import const, micropython, ptr16, ptr32, uint
 
-# One row: where each number of a bubble stands. The first four are its figures, in the order of `figures`.
+# One row: where each number of a bubble stands. The first four are its figures, in the order of `figures`. Offsets
+# below 32 are cheap to reach.
 ZERO = const(0)  # sensor counts at no pressure
 OPENS_US = const(1)  # valve dead times
 CLOSES_US = const(2)
 FLOW_GAIN = const(3)  # root of pressures (8 Pa) to flow (µJ/ms), /65536
-KNOTS = const(4)  # knots of its table
-PRESSURE = const(5)  # measured, Pa gauge
-TARGET = const(6)  # asked, µm
-START = const(7)  # where the ramp to the target began, µm
-AIR = const(8)  # air at the start of this period, µJ
-DOSE = const(9)  # air that the period now playing brings, µJ
-NEXT = const(10)  # air that the period after it will bring, µJ
-BUSY = const(11)  # from the start of the period until the line is quiet, µs
-TRUST = const(12)  # how many measurements the estimate averages; 0: none yet
-ROOT = const(13)  # root of pressures at the last dose, 8 Pa
+PRESSURE = const(4)  # measured, Pa gauge
+ALERT = const(5)  # whether the last reading was one that may become a fault
+CALM = const(6)  # whether nothing is under way
+WAIT = const(7)  # readings yet to be summed before the mean is taken; -1: there is no sum
+SUM = const(8)  # of pressures, Pa
+BUSY = const(9)  # from the start of the period until the line is quiet, µs
+AIR = const(10)  # air at the start of this period, µJ
+DOSE = const(11)  # air that the period now playing brings, µJ
+NEXT = const(12)  # air that the period after it will bring, µJ
+TRUST = const(13)  # how many readings the estimate averages; 0: none yet
 FLOW = const(14)  # flow at the last dose, µJ/ms, *16, filling or venting
 INTEGRAL = const(15)  # of the error, µJ ticks
 ERROR = const(16)  # last tick's, µJ
@@ -40,21 +44,33 @@ AIM = const(17)  # air of last tick's setpoint, µJ
 FILL_US = const(18)  # energised in the period now playing
 VENT_US = const(19)
 FILL_RUN_US = const(20)  # how long the fill valve has been open at a stretch
-OVER = const(21)  # ticks in a row above the pressure limit
-LOST = const(22)  # ticks in a row with the sensor at an end of its range
-FAULTS = const(23)
-STATUS = const(24)
-# Two heights are weighed: the estimate and the setpoint. Each is followed by what its table says of it.
-HEIGHT = const(25)  # in 1/16 µm, so that averages do not stall on whole ones
-SETPOINT = const(31)  # in 1/16 µm
-SEGMENT = const(1)  # index of its table segment
-MODEL = const(2)  # pressure, Pa
-CONTENT = const(3)  # air, µJ
-SLOPE = const(4)  # air per height, µJ/µm, *256
-WEIGHED = const(5)  # the height that these belong to
-LOWEST = const(37)  # pressures of its table, Pa
-HIGHEST = const(38)
+FAULTS = const(21)
+STATUS = const(22)
+TARGET = const(23)  # asked, µm
+# Two heights, the estimate and the setpoint. Each is followed by what its curve says of it.
+HEIGHT = const(24)  # in 1/16 µm, so that averages do not stall on whole ones
+SETPOINT = const(28)  # in 1/16 µm
+SEGMENT = const(1)  # where its segment of the curve begins, bytes
+SLOPE = const(2)  # air per height in that segment, µJ/µm, *256
+MODEL = const(3)  # of the estimate: the pressure that belongs to it, Pa
+CONTENT = const(3)  # of the setpoint: its air, µJ
+START = const(32)  # where the ramp to the target began, µm
+FIRST = const(33)  # first and last segment of its curve, bytes
+LAST = const(34)
+LOWEST = const(35)  # pressures of its curve, Pa
+HIGHEST = const(36)
+OVER = const(37)  # ticks in a row above the pressure limit
+LOST = const(38)  # ticks in a row with the sensor at an end of its range
 ROW = const(39)
+
+# A knot of a curve, see `curve`.
+H = const(0)  # height, 1/16 µm
+A = const(1)  # air, µJ
+P = const(2)  # pressure, Pa
+S = const(3)  # air per height from here on, µJ/µm, *256
+R = const(4)  # its reciprocal, 2^28/S
+D = const(5)  # pressure per air, Pa/µJ, *4096
+KNOT = const(6)
 
 # The board's numbers.
 N = const(0)
@@ -62,25 +78,29 @@ TICK_US = const(1)
 PA_PER_COUNT = const(2)
 COUNT_LOW = const(3)
 COUNT_HIGH = const(4)
-DEAD_VOLUME = const(5)  # 1/64 mm³
-REST_UM = const(6)
-PRESSURE_MAX = const(7)
-FILL_MAX_US = const(8)
-PULSE_MIN_US = const(9)
-QUIET_US = const(10)
-CRITICAL = const(11)  # critical pressure ratio, *256
-TUBE = const(12)  # pressure lost along the tube, Pa per µJ/ms
-GAIN_P = const(13)  # gains *256
-GAIN_I = const(14)
-GAIN_D = const(15)
-DEADBAND_UM = const(16)
-SETTLED_UM = const(17)
-KNOT_STRIDE = const(18)  # words between two bubbles' tables
-SUPPLY = const(19)  # measured, Pa gauge
-MODE = const(20)
-RAMP_DONE = const(21)  # ticks
-RAMP_TICKS = const(22)
-BOARD = const(23)
+PRESSURE_MAX = const(5)
+FILL_MAX_US = const(6)
+PULSE_MIN_US = const(7)
+QUIET_US = const(8)
+TUBE = const(9)  # pressure lost along the tube, Pa per µJ/ms
+GAIN_P = const(10)  # gains *256
+GAIN_I = const(11)
+GAIN_D = const(12)
+DEADBAND_UM = const(13)
+SETTLED_UM = const(14)
+REST_UM = const(15)
+SUPPLY = const(16)  # measured, Pa gauge
+MODE = const(17)
+RAMP_DONE = const(18)  # ticks
+RAMP_TICKS = const(19)
+ROOT_SCALE = const(20)  # supply's absolute pressure, 8 Pa
+ROOT_SHARE = const(21)  # its reciprocal, (2^30 - 1)/Pa
+BOARD = const(22)
+
+# The state: the board's numbers, then the tables of roots, the rows, the curves.
+ROOTS = const(22)
+STEPS = const(64)  # in each of the two tables, see `curve`
+ROWS = const(152)
 
 ATMOSPHERE = const(101325)
 AIR_MAX = const(400000)  # more than any bubble of 16 mm holds: keeps every product below within 32 bits
@@ -91,12 +111,9 @@ SURPRISE_PA = const(500)  # by more than noise: believe the sensor afresh
 INTEGRAL_MAX = const(1 << 17)
 READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noise
 ABSENT = const(0xFFFF)  # a count that says: no chip has answered. That is no noise
-STEP_MAX = const(16000)  # 1/16 µm: 1 mm, far more than one period moves a bubble
-NEAR = const(320)  # 1/16 µm: 20 µm, so near to the height last weighed its tangent is good to 0.1 µm
-ROOT_MAX = const(20000)  # 8 Pa: more than any two readings give; from there Newton's next step is a good one
-STEEP_MAX = const(50000)  # Pa/mm: more, and the slope of the air of a bubble of 16 mm is beyond 32 bits
 SIZE_MAX = const(50000)  # µJ, more than any period brings
-SLOPE_MIN = const(256)
+SUMMED = const(3)  # readings of a calm bubble that are summed; with the one after them they make a mean of four
+ROOT_END = const(8191)  # the last place in a table of roots, *128
 
 # From the schema; a test compares them.
 VENTED = const(0)
@@ -118,278 +135,289 @@ def flow_gain(board):
 
 
 @micropython.viper
-def estimate(s: ptr32, k: ptr32, knot: ptr16, count: ptr16, supply: int, mode: int):
-    """Read the sensors; bring each bubble's air and height up to the start of this period."""
-    k[SUPPLY] = supply
-    k[MODE] = mode
+def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int):
+    """One tick of all bubbles: counts of their sensors in, `pulses` out, fill and vent µs of each in the next period."""
     n = k[N]
+    curves = ptr32(uint(k) + 4 * (ROWS + ROW * n))
+    tick = k[TICK_US]
+    calm = 1 if mode == k[MODE] else 0
+    k[MODE] = mode
+    k[SUPPLY] = supply
+    k[ROOT_SCALE] = supply + ATMOSPHERE >> 3
+    k[ROOT_SHARE] = 0x3FFFFFFF // (supply + ATMOSPHERE)
+    share = 0  # of the ramp, *4096; 0: it stands still
+    if k[RAMP_DONE] != k[RAMP_TICKS]:
+        k[RAMP_DONE] = k[RAMP_DONE] + 1
+        share = (k[RAMP_DONE] << 12) // k[RAMP_TICKS]
+        calm = 0
     i = 0
     while i < n:
         c = count[i]
-        lost = 1 if c <= k[COUNT_LOW] or c >= k[COUNT_HIGH] else 0
-        if lost:
-            s[LOST] = s[LOST] + 1 if c < ABSENT else READINGS_MIN
-        else:
-            s[LOST] = 0
-            s[PRESSURE] = (c - s[ZERO]) * k[PA_PER_COUNT]
-        p = s[PRESSURE]
-        air = s[AIR] + s[DOSE]
-        slope = s[HEIGHT + SLOPE]
-        open_vent = 1 if s[STATUS] == RESTING or s[STATUS] == FAULT else 0
-        if lost == 0 and (open_vent or s[BUSY] <= 0):
-            # The height that holds this pressure: in the segment that contains it and is nearest to the
-            # estimate's, because a bubble stays on the branch where it was. No segment: beyond an end.
-            begin = i * k[KNOT_STRIDE]
-            end = begin + 2 * (s[KNOTS] - 1)
-            low = begin + 2 * s[HEIGHT + SEGMENT]
-            high = low
-            found = -1
-            within = 1 if s[LOWEST] <= p and p <= s[HIGHEST] else 0
-            while within and found < 0 and (low >= begin or high < end):
-                if low >= begin:
-                    if (knot[low + 1] <= p and p <= knot[low + 3]) or (knot[low + 3] <= p and p <= knot[low + 1]):
-                        found = low
-                    low -= 2
-                if found < 0 and high < end:
-                    if (knot[high + 1] <= p and p <= knot[high + 3]) or (knot[high + 3] <= p and p <= knot[high + 1]):
-                        found = high
-                    high += 2
-            if found < 0:
-                measured = knot[end] if p > 0 else knot[begin]
+        p = (c - s[ZERO]) * k[PA_PER_COUNT]
+        if (c - k[COUNT_LOW] - 1 | k[COUNT_HIGH] - 1 - c | k[PRESSURE_MAX] - p) >> 31 | s[ALERT]:
+            # Guard: the sensor at an end of its range, or too much pressure, now or in the tick before.
+            s[ALERT] = 0
+            s[CALM] = 0
+            s[WAIT] = -1
+            if c <= k[COUNT_LOW] or c >= k[COUNT_HIGH]:
+                s[ALERT] = 1
+                s[LOST] = s[LOST] + 1 if c < ABSENT else READINGS_MIN
+                p = s[PRESSURE]
             else:
-                measured = knot[found]
-                rise = knot[found + 3] - knot[found + 1]
-                if rise != 0:
-                    measured += (p - knot[found + 1]) * (knot[found + 2] - knot[found]) // rise
-            off = measured - (s[HEIGHT + WEIGHED] >> 4)
-            trust = s[TRUST] + 1
-            if open_vent:
-                trust = 0
-            elif (off > SURPRISE_UM or off < 0 - SURPRISE_UM) and (
-                p - s[HEIGHT + MODEL] > SURPRISE_PA or p - s[HEIGHT + MODEL] < 0 - SURPRISE_PA
-            ):
-                trust = 1
-            elif trust > TRUST_MAX:
-                trust = TRUST_MAX
-            s[TRUST] = trust
-            off = s[HEIGHT + CONTENT] + (off * slope >> 8) - air  # now of air
-            if trust == 0:
-                air += off >> 2
+                s[LOST] = 0
+            if p > k[PRESSURE_MAX]:
+                s[ALERT] = 1
+                s[OVER] = s[OVER] + 1
             else:
-                air += (off + (trust >> 1)) // trust  # rounded: a bias would add up over so many
-        if air < 0:
-            air = 0
-        if air > AIR_MAX:
-            air = AIR_MAX
-        s[AIR] = air
-        # The height that this air means, along the tangent at the height last weighed.
-        step = (air - s[HEIGHT + CONTENT] << 12) // slope
-        if step > STEP_MAX:
-            step = STEP_MAX
-        if step < 0 - STEP_MAX:
-            step = 0 - STEP_MAX
-        s[HEIGHT] = s[HEIGHT + WEIGHED] + step
-        i += 1
-        s = ptr32(uint(s) + 4 * ROW)
+                s[OVER] = 0
+            if s[OVER] >= READINGS_MIN:
+                s[FAULTS] = s[FAULTS] | OVERPRESSURE
+            if s[LOST] >= READINGS_MIN:
+                s[FAULTS] = s[FAULTS] | SENSOR_LOST
+        s[PRESSURE] = p
 
-
-@micropython.viper
-def weigh(s: ptr32, k: ptr32, knot: ptr16):
-    """Move the setpoints on; then pressure, air and air per height of every estimate and setpoint, by the bubble's table.
-
-    An estimate is weighed again when it has left the neighbourhood of where it was weighed last.
-    """
-    n = k[N]
-    dead = k[DEAD_VOLUME]
-    moving = 0
-    if k[RAMP_DONE] < k[RAMP_TICKS]:
-        k[RAMP_DONE] = k[RAMP_DONE] + 1
-        moving = 1
-    i = 0
-    while i < n:
-        if moving:
-            reach = s[TARGET] - s[START]
-            s[SETPOINT] = (s[START] + reach * k[RAMP_DONE] // k[RAMP_TICKS]) << 4
-        w = s
-        exact = 2  # nothing to do
-        off = s[HEIGHT] - s[HEIGHT + WEIGHED]
-        if off > NEAR or off < 0 - NEAR or s[SETPOINT] != s[SETPOINT + WEIGHED]:
-            w = ptr32(uint(s) + 4 * HEIGHT)
-            exact = 0
-        while exact < 2:
-            off = w[0] - w[WEIGHED]
-            if off > NEAR or off < 0 - NEAR or (exact and off != 0):
-                begin = i * k[KNOT_STRIDE]
-                end = begin + 2 * (s[KNOTS] - 1)
-                if w[0] < knot[begin] << 4:
-                    w[0] = knot[begin] << 4
-                if w[0] > knot[end] << 4:
-                    w[0] = knot[end] << 4
-                h = w[0] >> 4
-                seg = begin + 2 * w[SEGMENT]
-                while h < knot[seg]:
-                    seg -= 2
-                while seg < end - 2 and h >= knot[seg + 2]:
-                    seg += 2
-                w[SEGMENT] = (seg - begin) >> 1
-                p0 = knot[seg + 1]
-                rise = knot[seg + 3] - p0
-                run = knot[seg + 2] - knot[seg]
-                p = p0 + rise * (h - knot[seg]) // run
-                steep = rise * 1000 // run  # Pa/mm
-                if steep > STEEP_MAX:
-                    steep = STEEP_MAX
-                if steep < 0 - STEEP_MAX:
-                    steep = 0 - STEEP_MAX
-                # Sphere of diameter h: V = pi/6 h³, dV/dh = pi/2 h². Volume in 1/64 mm³, pressure in 16 Pa.
-                square = h * h >> 12
-                volume = ((square * h >> 12) * 2303 >> 12) + dead
-                p16 = p + ATMOSPHERE >> 4
-                w[MODEL] = p
-                w[CONTENT] = p16 * volume // 4000
-                # d(pV)/dh = p dV/dh + V dp/dh, *256; kept positive, as it is for every bubble that holds air
-                slope = ((p16 * square >> 12) * 7074 >> 16) + (((volume >> 4) * steep >> 6) * 268 >> 16)
-                w[SLOPE] = slope if slope > SLOPE_MIN else SLOPE_MIN
-                w[WEIGHED] = w[0]
-            w = ptr32(uint(s) + 4 * SETPOINT)
-            exact += 1
-        i += 1
-        s = ptr32(uint(s) + 4 * ROW)
-
-
-@micropython.viper
-def control(s: ptr32, k: ptr32, pulse: ptr16):
-    """Guard, then decide what each valve does in the next period: `pulses` holds fill and vent µs of every bubble."""
-    n = k[N]
-    tick = k[TICK_US]
-    i = 0
-    while i < n:
-        p = s[PRESSURE]
-        filled = s[FILL_US]
-        vented = s[VENT_US]
-        energised = filled + vented
-        opens = s[OPENS_US]
-        closes = s[CLOSES_US]
-        s[DOSE] = s[NEXT]
-
-        # Guard. A fault stays until it is cleared.
-        s[OVER] = s[OVER] + 1 if p > k[PRESSURE_MAX] else 0
-        s[FILL_RUN_US] = s[FILL_RUN_US] + filled if filled == tick else 0
-        if s[OVER] >= READINGS_MIN:
-            s[FAULTS] = s[FAULTS] | OVERPRESSURE
-        if s[LOST] >= READINGS_MIN:
-            s[FAULTS] = s[FAULTS] | SENSOR_LOST
-        if s[FILL_RUN_US] >= k[FILL_MAX_US]:
-            s[FAULTS] = s[FAULTS] | VALVE_TIME
-
-        # When will the line be quiet, seen from the start of the next period?
-        if energised:
-            s[BUSY] = energised + closes + k[QUIET_US] - tick
-        elif s[BUSY] > 0:
-            s[BUSY] = s[BUSY] - tick
-
-        # A valve energised to the end of this period closes its dead time into the next: that air comes anyway.
-        tail = 0
-        if energised == tick:
-            tail = s[FLOW] * closes // 16000
-            if vented:
-                tail = 0 - tail
-
-        fill = 0
-        vent = 0
-        dose = tail
-        aim = s[SETPOINT + CONTENT]
-        ahead = aim - s[AIM]  # what the setpoint's own motion asks for: feed-forward
-        error = s[AIM] - s[AIR] - s[DOSE] - tail
-        resting = 1 if s[SETPOINT] <= (k[REST_UM] + k[DEADBAND_UM]) << 4 else 0
-        if s[FAULTS] or k[MODE] == VENTED or (k[MODE] == ACTIVE and resting):
-            s[STATUS] = FAULT if s[FAULTS] else RESTING
-            vent = tick
-            dose = 0
-            aim = s[AIR]
-            error = 0
-            s[INTEGRAL] = 0
-            s[TRUST] = 0
-            s[FLOW] = 0
-        elif k[MODE] != ACTIVE:
-            s[STATUS] = STOPPED
-            aim = s[AIR]
-            error = 0
-        else:
-            off = s[TARGET] - (s[HEIGHT] >> 4)
-            still = 1 if k[RAMP_DONE] == k[RAMP_TICKS] else 0
-            near = 1 if off <= k[SETTLED_UM] and off >= 0 - k[SETTLED_UM] else 0
-            s[STATUS] = SETTLED if near and still and s[TRUST] > 1 else MOVING
-            band = s[SETPOINT + SLOPE] * k[DEADBAND_UM] >> 8
-            enough = 1 if ahead == 0 and error <= band and error >= 0 - band else 0
-            if s[TRUST] and enough == 0:
-                integral = s[INTEGRAL] + error
-                change = error - s[ERROR]
-                want = ahead + (error * k[GAIN_P] + integral * k[GAIN_I] + change * k[GAIN_D] >> 8)
-                fills = 1 if want > 0 else 0
-                size = want if fills else 0 - want
-
-                # Flow of a restrictor below its critical ratio (ISO 6358): C p1 sqrt(1 - ((p2/p1 - b)/(1 - b))²)
-                # = C/(1 - b) sqrt((p1 - p2) (p2 + (1 - 2b) p1)). The root by Newton from the last one.
-                lost = k[TUBE] * s[FLOW] >> 4 if s[BUSY] <= 0 else 0
-                if fills:
-                    p1 = k[SUPPLY] + ATMOSPHERE
-                    p2 = p + lost + ATMOSPHERE
-                else:
-                    p1 = p - lost + ATMOSPHERE
-                    p2 = ATMOSPHERE
-                square = 0
-                if p1 > p2:
-                    square = (p1 - p2 >> 3) * ((p1 * (256 - 2 * k[CRITICAL]) >> 8) + p2 >> 3)
-                root = s[ROOT]
-                root = (root + square // root >> 1) + 1
-                if root > ROOT_MAX:  # far off, as after no pressure at all
-                    root = ROOT_MAX
-                root = (root + square // root >> 1) + 1
-                s[ROOT] = root
-                flow = (root * s[FLOW_GAIN] >> 12) + 1
-                s[FLOW] = flow
-
-                # Air to time. A valve that is still open needs no opening and its closing is in the tail.
-                if size > SIZE_MAX:
-                    size = SIZE_MAX
-                opened = 1 if (fills and filled == tick) or (fills == 0 and vented == tick) else 0
-                delay = 0 if opened else opens - closes
-                width = size * 16000 // flow + delay
-                if width > tick - k[PULSE_MIN_US]:  # too short a gap to close in
-                    width = tick if width > tick - (k[PULSE_MIN_US] >> 1) else tick - k[PULSE_MIN_US]
-                elif opened == 0 and width < k[PULSE_MIN_US]:
-                    shortest = k[PULSE_MIN_US] - delay  # of open time; half of it or more is worth a pulse
-                    width = k[PULSE_MIN_US] if 2 * (width - delay) >= shortest else 0
-                if width < tick:
-                    # Only while not saturated: the integral must not wind up.
-                    if integral > INTEGRAL_MAX:
-                        integral = INTEGRAL_MAX
-                    if integral < 0 - INTEGRAL_MAX:
-                        integral = 0 - INTEGRAL_MAX
-                    s[INTEGRAL] = integral
-                if width:
-                    moved = width - delay
-                    if width == tick:
-                        moved -= closes
-                    moved = flow * moved // 16000
-                    if fills:
-                        fill = width
-                        dose += moved
+        work = 1
+        if s[CALM] & calm:
+            if s[BUSY] > 0:
+                s[BUSY] = s[BUSY] - tick
+                work = 0
+            elif s[WAIT] > 0:
+                s[WAIT] = s[WAIT] - 1
+                s[SUM] = s[SUM] + p
+                work = 0
+        if work:
+            air = s[AIR] + s[DOSE]
+            seg = s[HEIGHT + SEGMENT]
+            q = ptr32(uint(curves) + seg)
+            if s[BUSY] <= 0 and s[ALERT] == 0:
+                # The air that this pressure means: in the segment that contains it and is nearest to the
+                # estimate's, because a bubble stays on the branch where it was.
+                mean = p
+                weight = 1
+                if s[WAIT] == 0:
+                    mean = s[SUM] + p >> 2
+                    weight = 4
+                s[WAIT] = -1
+                if (mean - s[LOWEST] | s[HIGHEST] - mean) >> 31:
+                    if mean < s[LOWEST]:
+                        q = ptr32(uint(curves) + s[FIRST])
+                        off = q[A] - air
                     else:
-                        vent = width
-                        dose -= moved
-                    if width == tick:
-                        s[TRUST] = 1
-                    elif s[TRUST] > TRUST_DOSED:
-                        s[TRUST] = TRUST_DOSED
-        s[AIM] = aim
-        s[ERROR] = error
-        s[NEXT] = dose
-        s[FILL_US] = fill
-        s[VENT_US] = vent
-        pulse[2 * i] = fill
-        pulse[2 * i + 1] = vent
+                        q = ptr32(uint(curves) + s[LAST])
+                        off = q[KNOT + A] - air
+                else:
+                    low = seg
+                    high = seg
+                    turn = 0
+                    while (mean - q[P]) * (q[KNOT + P] - mean) >> 31:
+                        if turn:
+                            turn = 0
+                            if low != s[FIRST]:
+                                low -= 4 * KNOT
+                            q = ptr32(uint(curves) + low)
+                        else:
+                            turn = 1
+                            if high != s[LAST]:
+                                high += 4 * KNOT
+                            q = ptr32(uint(curves) + high)
+                    off = q[A] - air
+                    rise = q[KNOT + P] - q[P]
+                    if rise:
+                        off += ((mean - q[P] << 12) // rise) * (q[KNOT + A] - q[A]) >> 12
+                if s[STATUS] & 3:
+                    trust = s[TRUST] + weight
+                    if trust > TRUST_MAX:
+                        trust = TRUST_MAX
+                    far = s[HEIGHT + SLOPE] * SURPRISE_UM >> 8
+                    q = ptr32(uint(curves) + seg)
+                    if (far - off | far + off) >> 31:
+                        if mean - s[HEIGHT + MODEL] > SURPRISE_PA or mean - s[HEIGHT + MODEL] < 0 - SURPRISE_PA:
+                            trust = 1
+                            weight = 1
+                    s[TRUST] = trust
+                    air += (off * weight + (trust >> 1)) // trust  # rounded: a bias would add up over so many
+                else:  # the vent is open: nothing is counted, the sensor alone says what there is
+                    q = ptr32(uint(curves) + seg)
+                    air += off
+                if air < 0:
+                    air = 0
+            if air > AIR_MAX:
+                air = AIR_MAX
+            s[AIR] = air
+
+            # The height that this air means.
+            off = air - q[A]
+            while (off | q[KNOT + A] - air) >> 31:  # it is in another segment
+                if off < 0:
+                    if seg == s[FIRST]:
+                        off = 0
+                        break
+                    seg -= 4 * KNOT
+                else:
+                    if seg == s[LAST]:
+                        off = q[KNOT + A] - q[A]
+                        break
+                    seg += 4 * KNOT
+                q = ptr32(uint(curves) + seg)
+                off = air - q[A]
+            height = q[H] + (off * q[R] >> 16)
+            s[HEIGHT] = height
+            s[HEIGHT + SEGMENT] = seg
+            s[HEIGHT + SLOPE] = q[S]
+            s[HEIGHT + MODEL] = q[P] + (off * q[D] >> 12)
+
+            # The air of the setpoint.
+            if share:
+                height = (s[START] << 4) + ((s[TARGET] - s[START]) * share >> 8)
+                s[SETPOINT] = height
+                seg = s[SETPOINT + SEGMENT]
+                q = ptr32(uint(curves) + seg)
+                off = height - q[H]
+                while (off | q[KNOT + H] - height) >> 31:
+                    if off < 0:
+                        if seg == s[FIRST]:
+                            off = 0
+                            break
+                        seg -= 4 * KNOT
+                    else:
+                        if seg == s[LAST]:
+                            off = q[KNOT + H] - q[H]
+                            break
+                        seg += 4 * KNOT
+                    q = ptr32(uint(curves) + seg)
+                    off = height - q[H]
+                s[SETPOINT + SEGMENT] = seg
+                s[SETPOINT + SLOPE] = q[S]
+                s[SETPOINT + CONTENT] = q[A] + (off * q[S] >> 12)
+
+            filled = s[FILL_US]
+            vented = s[VENT_US]
+            energised = filled + vented
+            dose = s[NEXT]
+            s[DOSE] = dose
+            tail = 0
+            if energised:
+                s[BUSY] = energised + s[CLOSES_US] + k[QUIET_US] - tick
+                s[FILL_RUN_US] = s[FILL_RUN_US] + filled if filled == tick else 0
+                if s[FILL_RUN_US] >= k[FILL_MAX_US]:
+                    s[FAULTS] = s[FAULTS] | VALVE_TIME
+                if energised == tick:
+                    # It closes its dead time into the next period: that air comes anyway. /16000 by multiplication.
+                    tail = (s[FLOW] * s[CLOSES_US] >> 12) * 16777 >> 16
+                    if vented:
+                        tail = 0 - tail
+            else:
+                s[FILL_RUN_US] = 0
+                if s[BUSY] > 0:
+                    s[BUSY] = s[BUSY] - tick
+
+            fill = 0
+            vent = 0
+            aim = s[SETPOINT + CONTENT]
+            rest = 0
+            if s[FAULTS]:
+                s[STATUS] = FAULT
+                rest = 1
+            elif mode == VENTED or (mode == ACTIVE and s[SETPOINT] <= k[REST_UM] + k[DEADBAND_UM] << 4):
+                s[STATUS] = RESTING
+                rest = 1
+            if rest:
+                s[CALM] = 1 if vented == tick and share == 0 else 0
+                s[NEXT] = 0
+                s[BUSY] = 0
+                s[AIM] = air
+                s[ERROR] = 0
+                s[INTEGRAL] = 0
+                s[TRUST] = 0
+                s[FLOW] = 0
+                vent = tick
+            elif mode != ACTIVE:
+                s[STATUS] = STOPPED
+                s[CALM] = 0 if energised or dose else 1
+                s[NEXT] = tail
+                s[AIM] = air
+                s[ERROR] = 0
+            else:
+                off = s[TARGET] - (s[HEIGHT] >> 4)
+                s[STATUS] = MOVING
+                if k[RAMP_DONE] == k[RAMP_TICKS] and s[TRUST] > 1 and (k[SETTLED_UM] - off | k[SETTLED_UM] + off) >> 31 == 0:
+                    s[STATUS] = SETTLED
+                ahead = aim - s[AIM]  # what the setpoint's own motion asks for: feed-forward
+                error = s[AIM] - air - dose - tail
+                s[AIM] = aim
+                s[NEXT] = tail
+                s[CALM] = 0
+                band = s[SETPOINT + SLOPE] * k[DEADBAND_UM] >> 8
+                if ahead | (band - error | band + error) >> 31 == 0:
+                    if (energised | dose | share) == 0:
+                        s[CALM] = 1
+                elif s[TRUST]:
+                    integral = s[INTEGRAL] + error
+                    want = ahead + (error * k[GAIN_P] + integral * k[GAIN_I] + (error - s[ERROR]) * k[GAIN_D] >> 8)
+
+                    # Flow of a restrictor below its critical ratio (ISO 6358), from the tables of its root.
+                    lost = k[TUBE] * s[FLOW] >> 4 if s[BUSY] <= 0 else 0
+                    size = want
+                    if want > 0:
+                        opened = 1 if filled == tick else 0
+                        at = (k[SUPPLY] - p - lost) * k[ROOT_SHARE] >> 16
+                        scale = k[ROOT_SCALE]
+                    else:
+                        size = 0 - want
+                        opened = 1 if vented == tick else 0
+                        at = p - lost >> 3
+                        scale = 1 << 14
+                    if at >> 13:
+                        at = ROOT_END if at > 0 else 0
+                    part = at & 127
+                    at >>= 7
+                    if want <= 0:
+                        at += STEPS + 1
+                    q = ptr32(uint(k) + 4 * at)
+                    root = scale * (q[ROOTS] + ((q[ROOTS + 1] - q[ROOTS]) * part >> 7)) >> 14
+                    flow = (root * s[FLOW_GAIN] >> 12) + 1
+                    s[FLOW] = flow
+
+                    # Air to time. A valve that is still open needs no opening and its closing is in the tail.
+                    if size > SIZE_MAX:
+                        size = SIZE_MAX
+                    delay = 0 if opened else s[OPENS_US] - s[CLOSES_US]
+                    width = size * 16000 // flow + delay
+                    shortest = k[PULSE_MIN_US]
+                    if width > tick - shortest:  # too short a gap to close in
+                        width = tick if width > tick - (shortest >> 1) else tick - shortest
+                    elif width < shortest:
+                        if opened == 0:  # of open time, half of the shortest or more is worth a pulse
+                            width = shortest if 2 * (width - delay) >= shortest - delay else 0
+                    if width < tick:
+                        # Only while not saturated: the integral must not wind up.
+                        if integral > INTEGRAL_MAX:
+                            integral = INTEGRAL_MAX
+                        if integral < 0 - INTEGRAL_MAX:
+                            integral = 0 - INTEGRAL_MAX
+                        s[INTEGRAL] = integral
+                    if width:
+                        moved = width - delay
+                        if width == tick:
+                            moved -= s[CLOSES_US]
+                            s[TRUST] = 1
+                        elif s[TRUST] > TRUST_DOSED:
+                            s[TRUST] = TRUST_DOSED
+                        moved = (flow * moved >> 12) * 16777 >> 16
+                        if want > 0:
+                            fill = width
+                            s[NEXT] = tail + moved
+                        else:
+                            vent = width
+                            s[NEXT] = tail - moved
+                s[ERROR] = error
+            if s[CALM] and s[BUSY] <= 0:
+                s[WAIT] = SUMMED
+                s[SUM] = 0
+            s[FILL_US] = fill
+            s[VENT_US] = vent
+        pulse[2 * i] = s[FILL_US]
+        pulse[2 * i + 1] = s[VENT_US]
         i += 1
         s = ptr32(uint(s) + 4 * ROW)
 
@@ -414,6 +442,7 @@ def aim(s: ptr32, v: ptr32, at: int, n: int):
     while n > 0:
         s[START] = s[HEIGHT] >> 4
         s[TARGET] = v[at]
+        s[CALM] = 0
         s = ptr32(uint(s) + 4 * ROW)
         at += 1
         n -= 1
@@ -425,6 +454,7 @@ def hold(s: ptr32, n: int):
     while n > 0:
         s[START] = s[HEIGHT] >> 4
         s[TARGET] = s[START]
+        s[CALM] = 0
         s = ptr32(uint(s) + 4 * ROW)
         n -= 1
 
@@ -435,6 +465,7 @@ def rest(s: ptr32, height: int, n: int):
     while n > 0:
         s[START] = height
         s[TARGET] = height
+        s[CALM] = 0
         s = ptr32(uint(s) + 4 * ROW)
         n -= 1
 
@@ -444,6 +475,7 @@ def forget(s: ptr32, n: int):
     """Forget all faults, but not what is about to become one."""
     while n > 0:
         s[FAULTS] = 0
+        s[CALM] = 0
         s = ptr32(uint(s) + 4 * ROW)
         n -= 1
 

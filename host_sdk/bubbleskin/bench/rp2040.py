@@ -1,0 +1,212 @@
+"""The firmware's speed on the emulated RP2040, in emulated cycles: the same in every run, and no timing of hardware."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubble_firmware import control
+from bubble_firmware.bubbles import Bubbles
+from bubble_firmware.table import Tables
+from bubbleskin.bench import float_law
+from bubbleskin.bench.rows import Row
+from bubbleskin.bench.trace import Tick, record
+from bubbleskin.build.rp2040 import BARE, firmware
+from bubbleskin.errors import BubbleskinError
+from bubbleskin.link.session import drive
+from bubbleskin.sim.board import load_board
+from bubbleskin.sim.rp2040 import open_chip
+from bubbleskin.sim.rp2040.chip import CLOCK_HZ, Chip
+from bubbleskin.sim.rp2040.prompt import Prompt
+from bubbleskin.sim.transport import SimulatedTransport
+from bubbleskin.skin import AsyncSkin, Skin
+
+_US = CLOCK_HZ // 1_000_000  # cycles
+_BOARDS = {"wristband7": ("0.8 ms, 40 % of 2 ms", 800), "wristband19": ("3.0 ms, 60 % of 5 ms", 3000)}
+_PHASES = (
+    ("following ramps", 0.2, 0.05, 0.05),
+    ("changing at once", 0.2, 0.05, 0.0),
+    ("coming to rest", 0.4, 0.0, 0.0),
+    ("at rest", 0.1, 0.0, 0.0),
+)
+_CHUNK = 20  # ticks sent to the prompt at once
+_SAME_US = 20  # so near, two pulses count as one
+_SAME_UM = 50
+
+_HARNESS = """
+from array import array
+import binascii, machine, time
+from bubble_firmware import boards, bubbles, table
+data = boards.load({board!r})
+machine.mem32[0xE000E014] = 0xFFFFFF
+machine.mem32[0xE000E010] = 5
+
+@micropython.viper
+def now() -> int:
+    return ptr32(0xE000E018)[0]
+
+def replay(ticks):
+    spent = array("i", bytearray(4 * len(ticks)))
+    said = []
+    k = 0
+    time.sleep_ms(20)  # until USB is quiet
+    for heights, over, counts, supply, mode in ticks:
+        if heights:
+            show(heights, over)
+        counts = array("H", binascii.unhexlify(counts))
+        step = law.step
+        a = now()
+        b = now()
+        step(counts, supply, mode)
+        c = now()
+        spent[k] = (b - c & 0xFFFFFF) - (a - b & 0xFFFFFF)
+        said.append(decided())
+        k += 1
+    print(" ".join(map(str, spent)))
+    print("\\n".join(said))
+"""
+
+_FIXED = """
+law = bubbles.Bubbles(data, table.Tables(data.BUBBLES))
+def show(heights, over):
+    law.show(array("i", heights), 0, over)
+def decided():
+    return " ".join(map(str, law.pulses))
+"""
+
+_FLOAT = """
+law = Bubbles(data, {curves!r})
+def show(heights, over):
+    law.show(heights, over)
+def decided():
+    return " ".join([str(int(width + 0.5)) for width in law.pulses()])
+"""
+
+
+class Replayed(NamedTuple):
+    """What a law on the chip takes and decides: emulated cycles, (ticks,), and pulses in µs, (ticks, 2n)."""
+
+    cycles: NDArray[np.int64]
+    pulses: NDArray[np.int64]
+
+
+def rows() -> Iterator[Row]:
+    """Control work against the same law in float bytecode; then whole ticks of both boards."""
+    yield from _control_rows("wristband7")
+    for board in _BOARDS:
+        yield from tick_rows(board)
+
+
+def _control_rows(board: str) -> Iterator[Row]:
+    ticks = record(board, _PHASES)
+    bare = firmware([BARE])[BARE]
+    fixed = replay(board, ticks, bare, _FIXED)
+    if fixed.pulses.tolist() != [tick.pulses for tick in ticks]:
+        raise BubbleskinError("The emulated chip has not decided what the simulator has: the firmware is at fault.")
+    source = Path(float_law.__file__).read_text(encoding="utf-8")
+    floats = replay(board, ticks, bare, source + _FLOAT.format(curves=curves(board)))
+    same = float(np.mean(np.abs(fixed.pulses - floats.pulses) <= _SAME_US))
+    if same < 0.95:
+        raise BubbleskinError(f"The law in floats decides otherwise in {1 - same:.0%} of all pulses: it is another law.")
+    bubbles = fixed.pulses.shape[1] // 2
+    phase = np.array([tick.phase for tick in ticks])
+    for name, *_ in _PHASES:
+        spent = fixed.cycles[phase == name] / bubbles / _US
+        yield Row(f"control of {board} per bubble and tick, {name}: mean", spent.mean(), "µs emulated", "≤ 6")
+        yield Row(f"the same, worst tick ({round(spent.max() * _US)} cycles)", spent.max(), "µs emulated")
+        ratio = floats.cycles[phase == name].sum() / fixed.cycles[phase == name].sum()
+        yield Row("the same law in float bytecode, times as long", ratio, "×", "≥ 15")
+    yield Row(f"pulses of both laws within {_SAME_US} µs", 100 * same, "%", "≥ 95")
+
+
+def curves(board: str) -> list[list[tuple[float, int, int]]]:
+    """The curves of every bubble by the tables of `board`: knots of (height µm, air µJ, pressure Pa)."""
+    data = load_board(board)
+    bubbles = Bubbles(data, Tables(data.BUBBLES))
+    found = []
+    for i in range(data.BUBBLES):
+        first, last = (bubbles._rows[i * control.ROW + edge] // 4 for edge in (control.FIRST, control.LAST))
+        knots = range(first, last + 2 * control.KNOT, control.KNOT)
+        words = bubbles._curves
+        found.append([(words[k + control.H] / 16, words[k + control.A], words[k + control.P]) for k in knots])
+    return found
+
+
+def replay(board: str, ticks: list[Tick], uf2: Path, law: str) -> Replayed:
+    """Let `law`, a script that makes `law`, `show` and `decided`, live through `ticks` at the prompt of `uf2`."""
+    prompt = Prompt(Chip(uf2))
+    prompt.run(_HARNESS.format(board=board))
+    prompt.run(law)
+    cycles: list[int] = []
+    pulses: list[list[int]] = []
+    for first in range(0, len(ticks), _CHUNK):
+        given = [
+            (*(tick.show or (None, 0)), tick.counts.tobytes().hex(), tick.supply_pa, tick.mode)
+            for tick in ticks[first : first + _CHUNK]
+        ]
+        spent, *said = prompt.run(f"replay({given!r})\n", seconds=60.0).splitlines()
+        cycles += map(int, spent.split())
+        pulses += [[int(width) for width in line.split()] for line in said]
+    return Replayed(np.array(cycles), np.array(pulses))
+
+
+def tick_rows(name: str, seconds: float = 5.0) -> Iterator[Row]:
+    """Whole ticks of the real UF2 with telemetry at 50 Hz and a new shape at 20 Hz, for so long in emulated time."""
+    target, limit = _BOARDS[name]
+    busy = load(name, seconds)
+    label = f"{name}, whole tick under load"
+    yield Row(f"{label}: mean at most", busy.mean_us, "µs emulated", target)
+    yield Row(f"{label}: longest at most", busy.worst_us, "µs emulated")
+    yield Row(f"{label}: of {limit / {800: 0.4, 3000: 0.6}[limit]:.0f} µs", busy.mean_us / limit * {800: 40, 3000: 60}[limit], "%")
+    yield Row(f"{label}: ticks that began late", busy.late, f"of {busy.ticks}", "0")
+    yield Row(f"{label}: heap lost", busy.heap_lost, "bytes", "0")
+    if name == "wristband7":
+        yield Row(f"{label}: of 1 ms, for 1 kHz", busy.mean_us / 10, "%")
+
+
+class Load(NamedTuple):
+    """What a board does under load. Times are upper edges of bins, see TICKS on the wire."""
+
+    ticks: int
+    mean_us: float
+    worst_us: float
+    late: int
+    heap_lost: int
+    telemetry: int
+
+
+def load(name: str, seconds: float) -> Load:
+    """Run `name` under load: telemetry at 50 Hz and a SHOW of another shape every 50 ms."""
+    board = open_chip(name, firmware([name])[name])
+    transport = SimulatedTransport(board, f"rp2040://{name}")
+    skin = Skin(drive(AsyncSkin.open(transport, 2.0, simulated=board)))
+    rng = np.random.default_rng(1)
+    n = len(skin.layout)
+    skin.vent()
+    skin.sleep(0.2)
+    skin.health()  # whatever is made on first use is there now
+    before, histogram = skin.health(), skin.tick_histogram()
+    end = board.time + seconds
+    due = board.time
+    states = 0
+    for _ in skin.telemetry(50):
+        states += 1
+        if board.time >= due:
+            skin.show(rng.uniform(5.5, 12.5, n), wait=False)
+            due += 0.05
+        if board.time >= end:
+            break
+    worked = skin.tick_histogram().worked - histogram.worked
+    skin.vent()
+    after = skin.health()
+    edges = (1 + np.arange(len(worked))) * histogram.work_bin * 1e6
+    return Load(
+        int(worked.sum()),
+        float(worked @ edges / worked.sum()),
+        float(edges[np.nonzero(worked)[0][-1]]),
+        after.late_ticks - before.late_ticks,
+        before.heap_free - after.heap_free,
+        states,
+    )
