@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from bubbleskin.errors import NoEquilibrium
 from bubbleskin.shape.contact import CompliantContact, Shape
 
 Array = NDArray[np.float64]
@@ -20,33 +21,46 @@ Order = tuple[tuple[int, ...], ...]
 GOAL_MM = 0.02
 """Newton ends here."""
 _STRIDE_MM = 1.0  # of free height: as far as a slope is trusted
-_TURNS = 12
+_TURNS = 15
 _COARSE = 4  # increments of a correction, which is short
 
 
 def correct(model: CompliantContact, shape: Shape, heights_mm: Array, highest: Array) -> Shape:
     """Change the pressures of `shape`, in [0, `highest`], until its heights are `heights_mm` or as near as they get.
 
-    Least squares where they cannot all be met. Returns the best shape on the way; it may be on another branch.
+    Least squares where they cannot all be met. It keeps to the branch that `shape` is on.
     """
-    best = shape
     for _ in range(_TURNS):
         error = heights_mm - shape.height_mm
-        if np.abs(error).max() < np.abs(heights_mm - best.height_mm).max():
-            best = shape
         if np.abs(error).max() < GOAL_MM or not shape.converged:
             break
-        slope = 1e6 * model.height_slope(shape)  # mm per kPa
+        try:
+            slope = 1e6 * model.height_slope(shape)  # mm per kPa
+        except NoEquilibrium:
+            break
         alone = 2e3 * model.free_radius(shape.pressure, shape.radius)
         low = np.minimum(model.free_pressure(alone - _STRIDE_MM), shape.pressure)
         high = np.minimum(np.maximum(model.free_pressure(alone + _STRIDE_MM), shape.pressure), highest)
         bounds = (1e-3 * (low - shape.pressure) - 1e-6, 1e-3 * np.maximum(high - shape.pressure, 0.0) + 1e-6)
         change = 1e3 * lsq_linear(slope, error, bounds).x
-        pressure = np.clip(shape.pressure + change, 0.0, highest)
-        if np.abs(pressure - shape.pressure).max() < 0.1:
+        nearer = _nearer(model, shape, heights_mm, change, highest)
+        if nearer is None:
             break
-        shape = model.settle([pressure], start=shape, increments=_COARSE)
-    return best
+        shape = nearer
+    return shape
+
+
+def _nearer(model: CompliantContact, shape: Shape, heights_mm: Array, change: Array, highest: Array) -> Shape | None:
+    """`shape` after as much of `change` as keeps to its branch and comes nearer; None if nothing does."""
+    error = float(((heights_mm - shape.height_mm) ** 2).sum())
+    for share in (1.0, 0.4, 0.15, 0.05):
+        pressure = np.clip(shape.pressure + share * change, 0.0, highest)
+        if np.abs(pressure - shape.pressure).max() < 0.1:
+            return None
+        trial = model.settle([pressure], start=shape, increments=_COARSE)
+        if trial.converged and not trial.snaps and float(((heights_mm - trial.height_mm) ** 2).sum()) < error:
+            return trial
+    return None
 
 
 def steps_of(order: Order, pressure: Array, begin: Array) -> Array:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,8 @@ LIMIT_MM = 14.0
 TOLERANCE_MM = 0.2
 """A bubble within it has the height asked for."""
 _SCREEN = 8  # increments per step while many orders are tried
-_TWOS, _THREES = 160, 200  # orders tried at most
+_FIRST, _BRANCHES, _TWOS, _THREES = 3, 100, 160, 200  # orders tried at most
+_LIFTED_MM = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,77 +150,59 @@ class _Search:
         self.error = np.inf
         self.steps: Array = self.begin[None]
         self.target: Shape | None = None  # a shape with the heights, however it was come by
-        self.unsure: tuple[float, Array] | None = None
 
     def best(self) -> Plan:
         """Try paths from the simplest on, and make a plan of the first good one."""
-        self._together()
-        for paths in (self._twos(), self._threes()):
-            if self.error <= self.tolerance:
-                break
+        for paths in (self._together(), self._branches(), self._twos(), self._threes()):
             for steps in paths:
                 if self._try(steps):
-                    break
+                    return self._plan()
         return self._plan()
 
-    # What is tried.
+    # What is tried. `target` is a shape with the heights asked for, as soon as one is known; which path ends there is
+    # then a matter of orders alone.
 
-    def _together(self) -> None:
-        if self._still():
-            return
-        first = self._follow(self.guess[None])
-        found = self._corrected(first)
-        if self._try(found.pressure[None]):
-            return
-        if self.target is None and self.start is not None:
-            return
-        if self._off(found) <= self.tolerance:
-            self._try(np.array([self.guess, found.pressure]))
-
-    def _still(self) -> bool:
-        if self.start is None or np.abs(self.start.height_mm - self.asked).max() > GOAL_MM:
-            return False
-        self.error = float(np.abs(self.start.height_mm - self.asked).max())
-        return True
-
-    def _twos(self) -> Iterator[Array]:
-        neighbours = self.model.layout.neighbours
-        self.pairs: list[Order] = []
-        if self.target is None:
-            yield from self._branches()
-        target = self.target or self._follow(self.steps)
-        wrong = np.flatnonzero(np.abs(self._follow(target.pressure[None]).height_mm - self.asked) > self.tolerance)
-        for order in pairs(target, target.pressure, neighbours, wrong.tolist()):
-            self.pairs.append(order)
-            yield steps_of(order, target.pressure, self.begin)
-            if len(self.pairs) >= _TWOS:
-                return
-        self.wrong = wrong.tolist()
-
-    def _threes(self) -> Iterator[Array]:
-        target = self.target or self._follow(self.steps)
-        flat = np.zeros_like(self.begin)
-        if self.start is not None:
-            for order in [(tuple(range(len(flat))),), *self.pairs]:  # down first, then as from flat
-                yield np.vstack([flat, steps_of(order, target.pressure, flat)])
-        for k, order in enumerate(triples(self.pairs, self.wrong)):
-            if k >= _THREES:
-                return
-            yield steps_of(order, target.pressure, self.begin)
+    def _together(self) -> Iterator[Array]:
+        if self.start is not None and np.abs(self.start.height_mm - self.asked).max() <= GOAL_MM:
+            yield self.begin[None]
+        self.first = self._follow(self.guess[None])
+        yield self._corrected(self.first).pressure[None]
 
     def _branches(self) -> Iterator[Array]:
-        """Where no pressures have been found yet: correct from the end of each order that ends on a new branch."""
-        first = self._follow(self.guess[None])
-        seen = {tuple(first.lifted_mm > 0.3)}
-        wrong = np.flatnonzero(np.abs(self.asked - first.height_mm) > self.tolerance).tolist()
-        for k, order in enumerate(pairs(first, self.guess, self.model.layout.neighbours, wrong)):
-            if k >= _TWOS or self.target is not None:
+        """Where no pressures are known that would do: correct from the end of each order that ends on a new branch."""
+        seen = {tuple(self.first.lifted_mm > _LIFTED_MM)}
+        wrong = np.flatnonzero(np.abs(self.asked - self.first.height_mm) > self.tolerance).tolist()
+        for order in islice(pairs(self.first, self.guess, self.model.layout.neighbours, wrong), _BRANCHES):
+            if self.target is not None:
                 return
             end = self._follow(steps_of(order, self.guess, self.begin), _SCREEN)
-            branch = tuple(end.lifted_mm > 0.3)
+            branch = tuple(end.lifted_mm > _LIFTED_MM)
             if branch not in seen:
                 seen.add(branch)
                 yield steps_of(order, self._corrected(end).pressure, self.begin)
+
+    def _twos(self) -> Iterator[Array]:
+        if self.target is None:
+            return
+        self.pairs: list[Order] = []
+        end = self._follow(self.target.pressure[None])
+        self.wrong = np.flatnonzero(np.abs(end.height_mm - self.asked) > self.tolerance).tolist()
+        orders = pairs(self.target, self.target.pressure, self.model.layout.neighbours, self.wrong)
+        for order in islice(orders, _TWOS):
+            self.pairs.append(order)
+            yield steps_of(order, self.target.pressure, self.begin)
+            if len(self.pairs) == _FIRST:  # beyond the order that one would expect: the way it was found
+                yield np.array([self.guess, self.target.pressure])
+
+    def _threes(self) -> Iterator[Array]:
+        if self.target is None:
+            return
+        flat = np.zeros_like(self.begin)
+        if self.start is not None:
+            for order in [(tuple(range(len(flat))),), *self.pairs]:  # down first, then as from flat
+                yield np.vstack([flat, steps_of(order, self.target.pressure, flat)])
+        for order in islice(triples(self.pairs, self.wrong), _THREES):
+            yield steps_of(order, self.target.pressure, self.begin)
 
     # How.
 
