@@ -14,7 +14,7 @@ from bubbleskin.physics.balloon import ATMOSPHERE
 from bubbleskin.physics.checks import finite, number, one_of, positive
 from bubbleskin.shape import energy as core
 from bubbleskin.shape.path import Outcome, Snap, Walker, ramps
-from bubbleskin.shape.relax import BURST, CONVERGED, evaluate, solve
+from bubbleskin.shape.relax import BURST, CONVERGED, evaluate, hold, solve
 
 Array = NDArray[np.float64]
 Ramp = Literal["pressure", "height"]
@@ -187,10 +187,10 @@ class CompliantContact:
 
     def free_pressure(self, height_mm: ArrayLike) -> Array:
         """Pressure (Pa) that holds each bubble at `height_mm`, (n,), if it stood alone; 0 at its rest height and below."""
-        h = np.broadcast_to(np.asarray(height_mm, dtype=float), (len(self),)) * 1e-3
-        tall = [max(one, balloon.rest_height) for one, balloon in zip(h, self.balloons, strict=True)]
-        held = (balloon.pressure_at_height(one) for one, balloon in zip(tall, self.balloons, strict=True))
-        return np.maximum(np.array(list(held)), 0.0)
+        radius = np.maximum(np.asarray(height_mm, dtype=float) * 0.5e-3, self.bubbles["outer"])
+        held = np.empty(len(self))
+        hold(radius, self.bubbles, held)
+        return np.maximum(held, 0.0)
 
     def height_by_air(self, shape: Shape, line_volume: float = LINE_VOLUME) -> Array:
         """Height in mm of each bubble alone with the air (pV, line included) that it has in `shape`, (n,)."""
@@ -208,13 +208,15 @@ class CompliantContact:
     def height_slope(self, shape: Shape) -> Array:
         """∂height/∂pressure of the settled `shape`, (n, n) m/Pa: row i, column j is bubble i's height by j's pressure.
 
-        From the implicit function theorem: H ds = 4π R² dP e, H the second derivatives of the energy.
+        From the implicit function theorem: H ds = 4π R² dP e, H the second derivatives of the energy. Raises
+        `NoEquilibrium` if `shape` is not a stable one.
         """
         n = len(self)
         rhs, out = np.zeros((n, n, 4)), np.zeros((n, n, 4))
         rhs[np.arange(n), np.arange(n), 3] = 4 * np.pi * shape.radius**2
         walker = self._walker(shape)
-        solve(shape.state, shape.pressure, self.bubbles, walker.springs, walker.pairs, rhs, out, 1e-9)
+        if not solve(shape.state, shape.pressure, self.bubbles, walker.springs, walker.pairs, rhs, out, 1e-9):
+            raise NoEquilibrium("The shape is about to snap: its heights have no slope. Change a pressure a little.")
         return np.asarray((out[:, :, 2] + out[:, :, 3]).T)
 
     def energy(self, state: Array, pressure: ArrayLike) -> float:

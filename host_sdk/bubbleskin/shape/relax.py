@@ -130,6 +130,8 @@ def newton_step(g, pairs, blocks, contacts, inverses, radius, accuracy, s, work)
                 return saved, True, dHd <= 0.0
             s[:] = 0.0
             saved = 0.0
+        if dHd <= 0.0 and radius == np.inf:
+            return saved, True, True
         if dHd <= 0.0 or rd >= edge * dHd:
             s += edge * d
             return saved + edge * rd - 0.5 * edge * edge * dHd, True, dHd <= 0.0
@@ -228,8 +230,8 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
         invert(blocks, inverses)
         good = True
         for k in range(len(rhs)):
-            _, _, negative = newton_step(-rhs[k], pairs, blocks, contacts, inverses, np.inf, accuracy, out[k], work)
-            good = good and not negative
+            _, edge, _ = newton_step(-rhs[k], pairs, blocks, contacts, inverses, np.inf, accuracy, out[k], work)
+            good = good and not edge
         return good
 
     @njit(cache=True)
