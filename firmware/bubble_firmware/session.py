@@ -76,6 +76,16 @@ class Session:
                 self._wait = self._period
                 self._telemetry()
 
+    def register(self, requests):
+        """Let others handle more requests: a handler for each id, with the same duties as those here."""
+        self._requests.update(requests)
+
+    def send_unasked(self, message_id, sequence, count):
+        """Send the message whose fields stand in `_values`; whether there was room."""
+        if self._owed:  # a reply comes first, and stands in the frame
+            return False
+        return self._app.hands.send(self._frame, self._pack(message_id, sequence, count))
+
     def fail(self):
         """Tell the host whose request was being handled that the device failed at it: once, if the link still works."""
         if self._handling:
@@ -141,7 +151,7 @@ class Session:
         values[26] = board.HEIGHT_MAX_UM
         values[27] = board.PRESSURE_MAX_PA
         values[28] = 1  # one request at a time
-        values[29] = 0
+        values[29] = messages.CAN_SEQUENCES
         values[30] = self._app.tables.crc
         self._reply(0)
 

@@ -112,7 +112,7 @@ def test_hello_introduces_the_board(rig):
         "height_max_um": board.HEIGHT_MAX_UM,
         "pressure_max_pa": board.PRESSURE_MAX_PA,
         "window": 1,
-        "capabilities": 0,
+        "capabilities": messages.CAN_SEQUENCES,
         "tables_crc": zlib.crc32(np.array(nominal.KNOTS, "<u2").tobytes() * board.BUBBLES),
     }
 

@@ -3,14 +3,14 @@
 import pytest
 
 from bubble_firmware import boards, session
-from bubble_protocol import codec, messages
+from bubble_protocol import codec, messages, steps
 from bubble_protocol.framing import PAYLOAD_MAX
 from bubble_protocol.messages import I32, MESSAGES, REPLY, TEXT, U8, U16, U32
 from bubbleskin.link import wire
 from bubbleskin.sim.board import BOARDS
 
 RANGES = {U8: (0, 0xFF), U16: (0, 0xFFFF), U32: (0, 0xFFFFFFFF), I32: (-(1 << 31), (1 << 31) - 1)}
-UNASKED = {messages.TELEMETRY, messages.ERROR}
+UNASKED = {messages.TELEMETRY, messages.ERROR, messages.SEQUENCE_EVENT}
 BUBBLES = 24  # the largest board a frame has room for
 
 FIELDS = [
@@ -78,6 +78,7 @@ def test_names_of_fields_are_unique_in_a_message():
         ("TELEMETRY", BUBBLES),
         ("TABLE_WRITE", 48),
         ("TABLE_READ_REPLY", 48),
+        ("SEQUENCE_WRITE", steps.HEAD + BUBBLES),
     ],
 )
 def test_a_frame_has_room_for_every_bubble(name, entries):
@@ -97,12 +98,22 @@ def test_telemetry_is_an_unasked_state():
     assert codec.BY_NAME["TELEMETRY"].repeated == codec.BY_NAME["STATE_REPLY"].repeated
 
 
-@pytest.mark.parametrize(
-    "table", [messages.ERRORS, messages.MODES, messages.STATUSES], ids=["errors", "modes", "statuses"]
-)
+ENUMERATIONS = {
+    "errors": messages.ERRORS[:9],  # the next are allotted in blocks
+    "sequence errors": messages.ERRORS[-7:],
+    "modes": messages.MODES,
+    "statuses": messages.STATUSES,
+    "sequence states": messages.SEQUENCE_STATES,
+    "sequence reasons": messages.SEQUENCE_REASONS,
+    "sequence events": messages.SEQUENCE_EVENTS,
+    "sequence actions": messages.SEQUENCE_ACTIONS,
+}
+
+
+@pytest.mark.parametrize("table", ENUMERATIONS.values(), ids=list(ENUMERATIONS))
 def test_an_enumeration_counts_on(table):
     first = table[0][0]
-    assert first in (0, 1)
+    assert first in (0, 1, messages.WRONG_BOARD)
     assert [entry[0] for entry in table] == list(range(first, first + len(table)))
     assert len({entry[1] for entry in table}) == len(table)
     for number, name, meaning in table:
