@@ -98,13 +98,14 @@ were sent, SEQUENCE_START names the tick of the first step. A record is {head} w
 
 | word | of a step | of a repeat |
 |---|---|---|
-| 0 | kind 0; bits 2, 3 easing (0 linear, 1 smooth, 2 in, 3 out); bit 4: goes on by time (0) or when settled (1); bits 5, 6: then after a timeout (0 go on, 1 hold, 2 vent, 3 stop) | kind 1 |
+| 0 | kind 0 (bits 0, 1), easing (2, 3), until (4), then (5, 6) | kind 1 |
 | 1 | ramp, ms, up to {ms} | times; 0: until it is stopped |
 | 2 | ms after the ramp: the time, or the timeout, up to {ms} | – |
 | 3 | tolerance, µm, {low} to {high}; 0 where it goes on by time | – |
 | 4 + i | target of bubble i, µm; 0xFFFF: as it is | – |
 
-Kind 2 ends a repeat; repeats nest up to {depth} deep, none is empty, and there are no jumps. A step takes a tick at least.
+Easing: 0 linear, 1 smooth, 2 in, 3 out. Until: 0 by time, 1 when all are settled. Then, after a timeout: 0 go on, 1 hold,
+2 vent, 3 stop. Kind 2 ends a repeat; repeats nest up to {depth} deep, none is empty, and there are no jumps. A step takes a tick at least.
 Times are ms by the wristband's clock: what is less than a tick is carried to the next step, so steps keep their schedule.
 The CRC-32 is that of all words, low byte first. Once a record is being played its place in a stream's memory is free.
 SHOW, STOP, VENT and everything that vents cancel a sequence.

@@ -32,7 +32,7 @@ from bubble_protocol.messages import (
 from bubble_protocol.portable import const, micropython, ptr16, ptr32
 
 _NEWS = const(8)  # events that may wait for room on the link
-_FIELDS = const(5)  # of an event: ticks, event, reason, record, unsettled
+_FIELDS = const(6)  # of an event: ticks, sequence, event, reason, record, unsettled
 _WHOLE = const(32768)
 _PIECE = const(4096)  # bytes
 
@@ -334,23 +334,20 @@ class Player:
             self.forget_news()
         at = (self._oldest + self.waiting_news) % _NEWS * _FIELDS
         news[at] = tick
-        news[at + 1] = event
-        news[at + 2] = reason
-        news[at + 3] = self.record
-        news[at + 4] = self.unsettled
+        news[at + 1] = self.id
+        news[at + 2] = event
+        news[at + 3] = reason
+        news[at + 4] = self.record
+        news[at + 5] = self.unsettled
         self.waiting_news += 1
 
     def read_news(self, values):
         """The oldest event, as the fields of SEQUENCE_EVENT."""
         news = self._news
         at = self._oldest * _FIELDS
-        values[0] = news[at]
-        values[1] = self.id
-        values[2] = news[at + 1]
-        values[3] = news[at + 2]
-        values[4] = news[at + 3]
-        values[5] = news[at + 4]
-        values[6] = self.sequence.free
+        for field in range(_FIELDS):
+            values[field] = news[at + field]
+        values[_FIELDS] = self.sequence.free
 
     def forget_news(self):
         """The oldest event has been told, or is lost."""

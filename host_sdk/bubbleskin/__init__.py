@@ -14,7 +14,10 @@ from bubbleskin.errors import (
     WrongDevice,
 )
 from bubbleskin.layout import Layout
+from bubbleskin.playing import Played, Playing
 from bubbleskin.records import Health, Info, State
+from bubbleskin.shape import sequences
+from bubbleskin.shape.sequence import After, Repeat, Sequence, Settled, Step
 from bubbleskin.skin import AsyncSkin, Skin
 
 if TYPE_CHECKING:
@@ -44,6 +47,7 @@ _PHYSICS = (
 )
 
 __all__ = [
+    "After",
     "AsyncSkin",
     "BubbleskinError",
     "Calibration",
@@ -55,8 +59,14 @@ __all__ = [
     "InvalidInput",
     "Layout",
     "LinkError",
+    "Played",
+    "Playing",
+    "Repeat",
+    "Sequence",
+    "Settled",
     "Skin",
     "State",
+    "Step",
     "Table",
     "WrongDevice",
     "YeohBalloon",
@@ -68,6 +78,7 @@ __all__ = [
     "fit_yeoh",
     "preset",
     "read_csv",
+    "sequences",
 ]
 
 

@@ -40,10 +40,22 @@ ERRORS = (
         "a record of a sequence is not sound: element is the record in this message, field the word in the record "
         "(0 flags, 1 ramp, 2 time or timeout, 3 tolerance, from 4 on targets), asked, low, high",
     ),
-    (BAD_LOOP, "bad_loop", "repeats and ends do not fit: element is the record in this message, asked the depth, high the most"),
-    (OUT_OF_ORDER, "out_of_order", "records come one after the other: asked is the first sent, low = high the one expected"),
+    (
+        BAD_LOOP,
+        "bad_loop",
+        "repeats and ends do not fit: element is the record in this message, asked the depth, high the most",
+    ),
+    (
+        OUT_OF_ORDER,
+        "out_of_order",
+        "records come one after the other: asked is the first sent, low = high the one expected",
+    ),
     (NO_ROOM, "no_room", "more records than are left: asked are the records sent, high what is left"),
-    (NOT_READY, "not_ready", "not now, or not this sequence: asked is the state, low the records received, high those in all"),
+    (
+        NOT_READY,
+        "not_ready",
+        "not now, or not this sequence: asked is the state, low the records received, high those in all",
+    ),
     (TOO_LATE, "too_late", "the tick to start at has passed: asked, low the next one"),
 )
 
@@ -162,7 +174,14 @@ _BUBBLES = (
 )
 _SEQUENCE = ("sequence", U16, "", None, None, "the host's number for this sequence")
 _RECORD = ("record", U32, "", None, None, "the step's record, counted from 0")
-_UNSETTLED = ("unsettled", U32, "", None, None, "bubbles, as bits, that were not there when a step ended by its timeout")
+_UNSETTLED = (
+    "unsettled",
+    U32,
+    "",
+    None,
+    None,
+    "bubbles, as bits, that were not there when a step ended by its timeout",
+)
 _FREE = ("free", U16, "records", None, None, "records that there is room for")
 _KNOTS = (
     ("knot_um", U16, "µm", 1, None, "height of a knot"),

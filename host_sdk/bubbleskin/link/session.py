@@ -35,6 +35,8 @@ class Link:
         self.transport = transport
         self.timeout = timeout
         self.telemetry: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
+        self.events: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
+        """What has happened to a sequence, as the device told it."""
         self._event_loop = event_loop
         self._reader = wire.Reader()
         self._heard = False
@@ -108,6 +110,8 @@ class Link:
         for message in self._reader.feed(data):
             if message.id == messages.TELEMETRY:
                 self.telemetry.append(message)
+            elif message.id == messages.SEQUENCE_EVENT:
+                self.events.append(message)
             elif message.id & messages.REPLY or message.id == messages.ERROR:
                 if len(self._replies) > 64:
                     self._replies.clear()

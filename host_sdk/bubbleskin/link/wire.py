@@ -132,8 +132,12 @@ _OF_SEQUENCES: dict[int, Callable[[Received], str]] = {
         f"repeats and their ends do not fit at record {error['element']}: depth {error['asked']}, "
         f"0 to {error['high']} is allowed, and none is empty."
     ),
-    messages.OUT_OF_ORDER: lambda error: f"record {error['asked']} came where {error['low']} was expected. Upload again.",
-    messages.NO_ROOM: lambda error: f"{error['asked']} records, with room for {error['high']}. Send what there is room for.",
+    messages.OUT_OF_ORDER: lambda error: (
+        f"record {error['asked']} came where {error['low']} was expected. Upload again."
+    ),
+    messages.NO_ROOM: lambda error: (
+        f"{error['asked']} records, with room for {error['high']}. Send what there is room for."
+    ),
     messages.NOT_READY: _not_ready,
     messages.TOO_LATE: lambda error: (
         f"tick {error['asked']}, at which to start, has passed; the next is {error['low']}. Start later, or at once."
