@@ -105,10 +105,10 @@ were sent, SEQUENCE_START names the tick of the first step. A record is {head} w
 | 4 + i | target of bubble i, µm; 0xFFFF: as it is | – |
 
 Easing: 0 linear, 1 smooth, 2 in, 3 out. Until: 0 by time, 1 when all are settled. Then, after a timeout: 0 go on, 1 hold,
-2 vent, 3 stop. Kind 2 ends a repeat; repeats nest up to {depth} deep, none is empty, and there are no jumps. A step takes a tick at least.
-Times are ms by the wristband's clock: what is less than a tick is carried to the next step, so steps keep their schedule.
-The CRC-32 is that of all words, low byte first. Once a record is being played its place in a stream's memory is free.
-SHOW, STOP, VENT and everything that vents cancel a sequence.
+2 vent, 3 stop. Kind 2 ends a repeat; repeats nest up to {depth} deep, none is empty, and there are no jumps. A step takes
+a tick at least. Times are ms by the wristband's clock: what is less than a tick is carried to the next step, so steps keep
+their schedule. The CRC-32 is that of all words, low byte first. Once a record is being played, its place in a stream's
+memory is free. SHOW, STOP, VENT and everything that vents cancel a sequence.
 """
 
 Field = tuple[str, int, str, int | None, int | None, str]

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """A sequence of steps in memory, and the player that executes it on the device's own clock.
 
 Times in records are ms; the player counts whole ticks and carries what is left over to the next step, so that every

@@ -1,8 +1,12 @@
 """On MicroPython the tick allocates nothing: a collection takes longer than a tick."""
 
+import struct
+import zlib
+
 import pytest
 
 from bubble_firmware import boards
+from bubble_protocol import messages, steps
 from bubbleskin.link import wire
 
 SCRIPT = """
@@ -115,7 +119,7 @@ gc.collect()
 gc.disable()
 grown = measure(app, hands)
 decoder = app.session._decoder
-print(grown, app.exceptions, decoder.good, hands.sent, hands.fills, hands.vents, hands.rests)
+print(grown, app.exceptions, decoder.good, hands.sent, hands.fills, hands.vents, hands.rests, app.player.number)
 
 exceptions = app.exceptions
 hands.broken = True
@@ -124,11 +128,21 @@ print(measure(app, hands), app.exceptions - exceptions, hands.safe)
 """
 
 ACTIVE = ("SUBSCRIBE", "SHOW up", "STATE", "PING", "INFO", "SHOW down", "PING", "STATE", "INFO")
+SEQUENCE = ("SEQUENCE_BEGIN", "SEQUENCE_WRITE", "SEQUENCE_ARM", "SEQUENCE_START", "SEQUENCE_STATE", *["PING"] * 20)
+SEQUENCE += (
+    "SEQUENCE_CONTROL pause",
+    "SEQUENCE_STATE",
+    "SEQUENCE_CONTROL resume",
+    *["STATE"] * 10,
+    "SEQUENCE_CONTROL end",
+)
 SEQUENCES = [
     pytest.param(ACTIVE, id="active"),
     pytest.param(("SHOW up", "HELLO", "STOP", "SHOW down", "VENT", "CLEAR", "TABLE_READ"), id="everything"),
     pytest.param(("SHOW up", "garbage", "too high", "wrong count", "wrong length", "unknown"), id="refused"),
     pytest.param(("TABLE_WRITE", "SHOW up", "STATE"), id="tables"),
+    pytest.param(SEQUENCE, id="sequence"),
+    pytest.param(("SEQUENCE_BEGIN stream", "SEQUENCE_WRITE stream", *SEQUENCE[1:5], "SHOW up"), id="sequences refused"),
 ]
 
 
@@ -149,7 +163,40 @@ def request(name, n):
         "wrong length": lambda: wire.encode("HELLO", 10, (1, 1))[:-1] + b"\x01\0",
         "unknown": lambda: wire.encode("PING_REPLY", 11, (0xFEDCBA98, 1, 1)),
     }
+    requests |= {
+        "SEQUENCE_BEGIN": lambda: wire.encode("SEQUENCE_BEGIN", 13, (3, n, 0, 5, program_crc(n))),
+        "SEQUENCE_WRITE": lambda: wire.encode("SEQUENCE_WRITE", 14, (3, 0), program(n)),
+        "SEQUENCE_ARM": lambda: wire.encode("SEQUENCE_ARM", 15, (3,)),
+        "SEQUENCE_START": lambda: wire.encode("SEQUENCE_START", 16, (3, 0)),
+        "SEQUENCE_CONTROL pause": lambda: wire.encode("SEQUENCE_CONTROL", 17, (3, messages.PAUSE)),
+        "SEQUENCE_CONTROL resume": lambda: wire.encode("SEQUENCE_CONTROL", 18, (3, messages.RESUME)),
+        "SEQUENCE_CONTROL end": lambda: wire.encode("SEQUENCE_CONTROL", 19, (3, messages.END)),
+        "SEQUENCE_BEGIN stream": lambda: wire.encode("SEQUENCE_BEGIN", 20, (4, n, 0, 0, 0xFFFFFFFF)),
+        "SEQUENCE_WRITE stream": lambda: wire.encode("SEQUENCE_WRITE", 21, (4, 0), program(n)),
+    }
     return requests[name]() if name in requests else wire.encode(name, 12)
+
+
+def program(n):
+    """A repeat of a ramp, of a step that waits until settled, and of one that only waits: words."""
+    up = [steps.flags(steps.SMOOTH, steps.TIME, 0), 90, 30, 0, *[6000 + 900 * bubble % 8000 for bubble in range(n)]]
+    down = [
+        steps.flags(steps.OUT, steps.SETTLE, steps.GO_ON),
+        50,
+        100,
+        300,
+        *[13000 - 700 * bubble % 8000 for bubble in range(n)],
+    ]
+    wait = [steps.flags(steps.LINEAR, steps.TIME, 0), 0, 15, 0, *[steps.LEAVE] * n]
+    blank = [0] * (n + 2)
+    return [
+        (word,) for record in ([steps.REPEAT, 0, *blank], up, down, wait, [steps.END, 0, *blank]) for word in record
+    ]
+
+
+def program_crc(n):
+    words = [word for (word,) in program(n)]
+    return zlib.crc32(struct.pack(f"<{len(words)}H", *words))
 
 
 @pytest.mark.parametrize("sequence", SEQUENCES)
@@ -160,13 +207,15 @@ def test_the_tick_allocates_nothing(micropython, board, sequence):
     said, failing = micropython(
         SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=17, ticks=4000)
     ).splitlines()
-    grown, exceptions, good, sent, fills, vents, rests = map(int, said.split())
+    grown, exceptions, good, sent, fills, vents, rests, events = map(int, said.split())
     assert exceptions == 0, "MemoryError while the heap was locked"
     assert grown == 0
     assert good > 500
     assert sent > 500
     # Nor when every tick fails: what makes the outputs safe must not need memory, for that may be what failed.
     assert failing == "0 4000 4000"
+    if sequence == SEQUENCE:
+        assert events > 100, "steps were played"
     if sequence == ACTIVE:
         assert sent > good, "telemetry and every reply"
         assert min(fills, vents, rests) > 4000 * n // 20, "valves of both kinds are at work"

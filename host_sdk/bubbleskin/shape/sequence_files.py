@@ -3,6 +3,7 @@
 import csv
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -189,7 +190,7 @@ def from_csv(path: str | Path, easing: str, lead: float, how: dict[str, Any]) ->
             )
         ramp = (now - before) / 1000 if now else lead
         before = now
-        steps.append(_told(where, lambda ramp=ramp, heights=heights: Step(heights, ramp, easing)))
+        steps.append(_told(where, partial(Step, heights, ramp, easing)))
     if not steps:
         raise InvalidInput(f"{path} has no rows below its header; a timeline needs at least one.")
     return Sequence(steps, **how)
