@@ -228,23 +228,22 @@ class Player:
 
     def _next(self, reason):
         """Begin the step that follows one that ended for `reason`, or end the sequence."""
-        if self._settle:
-            self.begun = self._app.ticks
-            if reason == BY_TIMEOUT:
-                self.timeouts += 1
-                if self._then != steps.GO_ON:
-                    self._end_by_timeout()
-                    return
-        else:
-            self.begun += self._length
+        tick = self._app.ticks
+        if not self._settle:
+            tick = self.begun + self._length
+        elif reason == BY_TIMEOUT:
+            self.timeouts += 1
+            if self._then != steps.GO_ON:
+                self._end_by_timeout(tick)
+                return
         sequence = self.sequence
         while True:
             record = sequence.next
             if sequence.total and record == sequence.total:
-                self._end(COMPLETE)
+                self._end(COMPLETE, tick)
                 return
             if record == sequence.received:
-                self._end(UNDERRUN)
+                self._end(UNDERRUN, tick)
                 return
             place = record % sequence.capacity
             memory = sequence.memory[place // sequence.piece]
@@ -268,6 +267,7 @@ class Player:
                     sequence.next = record + 1
         sequence.next = record + 1
         self.record = record
+        self.begun = tick
         self._tell(STEP_BEGUN, reason, self.begun)
         self._begin(memory, at)
 
@@ -293,25 +293,25 @@ class Player:
         self._moving = True
         self._app.bubbles.step(memory, at + steps.HEAD, self._app.mode != ACTIVE)
 
-    def _end_by_timeout(self):
+    def _end_by_timeout(self, tick):
         app = self._app
-        self._end(BY_TIMEOUT)
+        self._end(BY_TIMEOUT, tick)
         if self._then == steps.VENT:
             app.vent()
         elif self._then == steps.STOP:
             app.stop()
 
-    def _end(self, reason):
+    def _end(self, reason, tick):
         self.running = False
         self.state = ENDED
         self.reason = reason
         self._moving = False
-        self._tell(SEQUENCE_ENDED, reason, self._app.ticks if self._settle or reason == CANCELLED else self.begun)
+        self._tell(SEQUENCE_ENDED, reason, tick)
 
     def cancel(self):
         """Something else decides from now on where the bubbles go."""
         if self.running:
-            self._end(CANCELLED)
+            self._end(CANCELLED, self._app.ticks)
 
     def pause(self):
         """Let time and setpoints stand still."""
