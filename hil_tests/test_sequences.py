@@ -214,7 +214,7 @@ def test_sixty_seconds_fit_the_memory(skin):
 
 @pytest.mark.slow
 def test_a_longer_one_streams_without_a_gap(skin):
-    sequence = choreography(skin, 300)
+    sequence = choreography(skin, 60, 0.02)
     with pytest.raises(bs.InvalidInput, match="wait=True"):
         skin.play(sequence, wait=False)
     check_schedule(skin, skin.play(sequence), sequence)

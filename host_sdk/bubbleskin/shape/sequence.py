@@ -30,13 +30,11 @@ _TICK = 0.005
 _TARGET_MAX = (limits.LEAVE - 1) / 1000
 
 
-def _seconds(value: Any, what: str, least: float = 0.0) -> float:
+def _seconds(value: Any, what: str) -> float:
     """A time, in whole ms."""
     seconds = _number(value, what)
-    if not least <= seconds <= SECONDS_MAX:
-        raise InvalidInput(
-            f"{what} is {seconds:g} s; {least:g} to {SECONDS_MAX:g} s is allowed. Repeat a step to wait longer."
-        )
+    if not 0 <= seconds <= SECONDS_MAX:
+        raise InvalidInput(f"{what} is {seconds:g} s; 0 to {SECONDS_MAX:g} s is allowed. Repeat a step to wait longer.")
     return round(seconds * 1000) / 1000
 
 
@@ -81,7 +79,7 @@ class Settled:
         if not low <= tolerance <= high:
             raise InvalidInput(f"The tolerance is {tolerance:g} mm; {low:g} to {high:g} mm is allowed.")
         object.__setattr__(self, "tolerance_mm", tolerance)
-        object.__setattr__(self, "timeout_s", _seconds(self.timeout_s, "The timeout", 0.001))
+        object.__setattr__(self, "timeout_s", _seconds(self.timeout_s, "The timeout"))
         _choice(self.then, THEN, "What follows the timeout")
 
 
