@@ -28,7 +28,7 @@ def rings(layout: Layout) -> list[NDArray[np.int64]]:
         ring[near] = ring[front[0]] + 1
         front = near
     ring = np.where(ring < 0, np.maximum(1, np.rint(distance / layout.pitch_mm)), ring)
-    angle = np.arctan2(away[:, 1], away[:, 0]) % (2 * np.pi - 1e-9)
+    angle = np.round(np.arctan2(away[:, 1], away[:, 0]), 6) % round(2 * np.pi, 6)  # nothing is just below 0
     order = np.lexsort((angle, ring))
     return [order[ring[order] == each] for each in np.unique(ring)]
 
