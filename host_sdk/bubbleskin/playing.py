@@ -1,5 +1,6 @@
 """Playing a sequence: upload, arm, start, and what the device tells of it on the way."""
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -7,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bubble_protocol import messages
-from bubbleskin.errors import DeviceFault, InvalidInput
+from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.session import Link
 from bubbleskin.link.wire import Received, crc32
@@ -139,7 +140,8 @@ class Player:
         while True:
             patience = _TOP_UP if feed.unsent else _POLL
             await link.wait(link.transport.now() + patience, lambda: bool(link.events))
-            await feed.fill()
+            with contextlib.suppress(DeviceRefused):  # it has ended meanwhile: the device will say why
+                await feed.fill()
             if link.events:
                 playing = told.take(link.events.popleft())
             else:
