@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import generated
-from bubble_protocol import codec, framing, messages, version
+from bubble_protocol import codec, framing, messages, steps, version
 from bubbleskin.link import wire
 
 PATH = Path("docs/protocol.md")
@@ -90,6 +90,25 @@ A table has 2 to 64 knots (height, gauge pressure); the wristband interpolates. 
 TABLE_COMMIT checks all tables received and takes them up together: heights rise, the last is at least the board's
 `height_max_um`, pressures are within `pressure_max_pa`, and the CRC-32 over all bubbles' knots is the host's.
 Otherwise the tables in use stay as they are.
+
+## Sequences
+
+SEQUENCE_BEGIN makes room, SEQUENCE_WRITE brings the records, SEQUENCE_ARM checks that all are there and are those that
+were sent, SEQUENCE_START names the tick of the first step. A record is {head} words of 16 bits and one for each bubble:
+
+| word | of a step | of a repeat |
+|---|---|---|
+| 0 | kind 0 (bits 0, 1), easing (2, 3), until (4), then (5, 6) | kind 1 |
+| 1 | ramp, ms, up to {ms} | times; 0: until it is stopped |
+| 2 | ms after the ramp: the time, or the timeout, up to {ms} | – |
+| 3 | tolerance, µm, {low} to {high}; 0 where it goes on by time | – |
+| 4 + i | target of bubble i, µm; 0xFFFF: as it is | – |
+
+Easing: 0 linear, 1 smooth, 2 in, 3 out. Until: 0 by time, 1 when all are settled. Then, after a timeout: 0 go on, 1 hold,
+2 vent, 3 stop. Kind 2 ends a repeat; repeats nest up to {depth} deep, none is empty, and there are no jumps. A step takes
+a tick at least. Times are ms by the wristband's clock: what is less than a tick is carried to the next step, so steps keep
+their schedule. The CRC-32 is that of all words, low byte first. Once a record is being played, its place in a stream's
+memory is free. SHOW, STOP, VENT and everything that vents cancel a sequence.
 """
 
 Field = tuple[str, int, str, int | None, int | None, str]
@@ -147,6 +166,11 @@ def page() -> str:
         frame=framing.FRAME_MAX,
         reply=messages.REPLY,
         ping=wire.encode("PING", 0x0102, (7,)).hex(" "),
+        head=steps.HEAD,
+        ms=steps.MS_MAX,
+        low=steps.TOLERANCE_MIN_UM,
+        high=steps.TOLERANCE_MAX_UM,
+        depth=steps.DEPTH_MAX,
         errors=enumeration(messages.ERRORS, "error").rstrip(),
     )
     parts = [head]
@@ -156,6 +180,10 @@ def page() -> str:
     parts += ["## Store\n", "Where what is in use comes from:\n", enumeration(messages.STORES, "store")]
     parts += ["What one of its slots holds:\n", enumeration(messages.SLOTS, "slot")]
     parts += ["## Capabilities\n", "Bits.\n", enumeration(messages.CAPABILITIES, "bit")]
+    parts += ["## Sequence state\n", enumeration(messages.SEQUENCE_STATES, "state")]
+    parts += ["## Sequence reason\n", enumeration(messages.SEQUENCE_REASONS, "reason")]
+    parts += ["## Sequence event\n", enumeration(messages.SEQUENCE_EVENTS, "event")]
+    parts += ["## Sequence action\n", enumeration(messages.SEQUENCE_ACTIONS, "action")]
     parts += [
         "## Messages\n",
         "Kinds: u is unsigned, i is signed, the number counts bits; text16 is 16 bytes of ASCII, zero padded. Where\n"

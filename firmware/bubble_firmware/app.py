@@ -26,6 +26,8 @@ from array import array
 from bubble_firmware.bubbles import Bubbles
 from bubble_firmware.figures import Figures
 from bubble_firmware.selftest import SelfTest
+from bubble_firmware.sequence import Player
+from bubble_firmware.sequence_requests import SequenceRequests
 from bubble_firmware.session import Session
 from bubble_firmware.store import Store
 from bubble_firmware.store_requests import StoreRequests
@@ -58,8 +60,10 @@ class App:
         self.self_test = SelfTest(board, hands.self_test)
         self.figures = Figures(board, self.bubbles)
         self.store = Store(self, getattr(hands, "flash", None))
+        self.player = Player(self)
         self.session = Session(self)
         StoreRequests(self, self.session)
+        self.sequence_requests = SequenceRequests(self, self.session)
         self._counts = array("H", bytearray(2 * (board.BUBBLES + 1)))
         hands.vent()
 
@@ -86,6 +90,8 @@ class App:
         supply.sense(counts[bubbles.count])
         if hands.alarms or supply.lost:
             self._alarm(hands.alarms)
+        if self.player.running:
+            self.player.tick()
         bubbles.step(counts, supply.pressure_pa, self.mode)
         if self.self_test.running:
             self._test()
@@ -95,6 +101,8 @@ class App:
     def _talk(self):
         hands = self.hands
         self.session.poll()
+        if self.player.waiting_news:
+            self.sequence_requests.tell()
         if not self.ticks & _TIDY_MASK and self.mode == VENTED:
             hands.tidy()
         spent = hands.phase_us()
@@ -126,6 +134,7 @@ class App:
     def show(self, values, first, over_ms):
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""
         self.self_test.skip()
+        self.player.cancel()
         ticks = over_ms * 1000 // self.board.TICK_US
         self.bubbles.show(values, first, ticks if ticks > 1 else 1)
         self.mode = ACTIVE
@@ -133,11 +142,13 @@ class App:
     def stop(self):
         """Close all valves and keep the air."""
         self.self_test.skip()
+        self.player.cancel()
         self.bubbles.hold()
         self.mode = HOLDING
 
     def vent(self):
         """Open all vent valves until the next `show`."""
+        self.player.cancel()
         self.bubbles.rest()
         self.mode = VENTED
 

@@ -7,6 +7,9 @@ from array import array
 
 from bubble_firmware import control, curve
 from bubble_firmware.table import KNOTS_MAX
+from bubble_protocol.portable import const
+
+_ONE = const(32768)  # a whole way, in the shares of `advance`
 
 
 class Bubbles:
@@ -89,6 +92,19 @@ class Bubbles:
         """Ramp every bubble from where it is to the height (µm) in `values[first:]` within `ticks` ticks."""
         control.aim(self._rows, values, first, self.count)
         self._ramp(ticks)
+
+    def step(self, words, at, from_height):
+        """Begin a step of a sequence, whose targets (µm) are `words[at:]`; `advance` moves it on."""
+        control.aim_on(self._rows, words, at, self.count, from_height, self._board[control.REST_UM])
+        self._ramp(_ONE)
+
+    def advance(self, share):
+        """Let the setpoints be `share`/32768 of their way at the end of this period. `decide` adds the last one."""
+        self._board[control.RAMP_DONE] = share - 1
+
+    def unsettled(self, tolerance):
+        """The bubbles, as bits, that are further than `tolerance` µm from their targets."""
+        return control.unsettled(self._rows, self.count, tolerance, self._board[control.REST_UM])
 
     def _ramp(self, ticks):
         self._board[control.RAMP_DONE] = 0

@@ -126,6 +126,7 @@ FAULT = const(4)
 OVERPRESSURE = const(1)
 SENSOR_LOST = const(2)
 VALVE_TIME = const(4)
+LEAVE = const(0xFFFF)
 
 
 def flow_gain(board):
@@ -340,7 +341,11 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
             else:
                 off = s[TARGET] - (s[HEIGHT] >> 4)
                 s[STATUS] = MOVING
-                if k[RAMP_DONE] == k[RAMP_TICKS] and s[TRUST] > 1 and (k[SETTLED_UM] - off | k[SETTLED_UM] + off) >> 31 == 0:
+                if (
+                    k[RAMP_DONE] == k[RAMP_TICKS]
+                    and s[TRUST] > 1
+                    and (k[SETTLED_UM] - off | k[SETTLED_UM] + off) >> 31 == 0
+                ):
                     s[STATUS] = SETTLED
                 ahead = aim - s[AIM]  # what the setpoint's own motion asks for: feed-forward
                 error = s[AIM] - air - dose - tail
@@ -446,6 +451,39 @@ def aim(s: ptr32, v: ptr32, at: int, n: int):
         s = ptr32(uint(s) + 4 * ROW)
         at += 1
         n -= 1
+
+
+@micropython.viper
+def aim_on(s: ptr32, w: ptr16, at: int, n: int, from_height: int, rest: int):
+    """Begin the way to the targets (µm) in `w[at:]`; a bubble whose target is LEAVE keeps the one that it has.
+
+    It begins where the setpoint is, so that a ramp follows another without a step, or at the estimated height.
+    """
+    while n > 0:
+        s[START] = (s[HEIGHT] if from_height else s[SETPOINT]) >> 4
+        target = w[at]
+        if target != LEAVE:
+            s[TARGET] = target if target > rest else rest  # lower would be the end of the ramp before its time
+        s = ptr32(uint(s) + 4 * ROW)
+        at += 1
+        n -= 1
+
+
+@micropython.viper
+def unsettled(s: ptr32, n: int, tolerance: int, rest: int) -> int:
+    """The bubbles, as bits, whose height is further than `tolerance` µm from the target, or not yet measured."""
+    bits = 0
+    bit = 1
+    while n > 0:
+        target = s[TARGET]
+        off = (target if target > rest else rest) - (s[HEIGHT] >> 4)
+        known = 1 if s[TRUST] > 1 or s[STATUS] == RESTING else 0
+        if off > tolerance or off < 0 - tolerance or known == 0 or s[FAULTS]:
+            bits |= bit
+        bit <<= 1
+        s = ptr32(uint(s) + 4 * ROW)
+        n -= 1
+    return bits
 
 
 @micropython.viper

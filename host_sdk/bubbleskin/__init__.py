@@ -17,7 +17,10 @@ from bubbleskin.errors import (
     WrongDevice,
 )
 from bubbleskin.layout import Layout
+from bubbleskin.playing import Played, Playing
 from bubbleskin.records import Health, Info, State
+from bubbleskin.shape import sequences
+from bubbleskin.shape.sequence import After, Repeat, Sequence, Settled, Step
 from bubbleskin.skin import AsyncSkin, Skin
 from bubbleskin.stored import Figures, StoreInfo
 
@@ -54,6 +57,7 @@ _LATER = {
 }
 
 __all__ = [
+    "After",
     "AsyncSkin",
     "BubbleskinError",
     "Calibration",
@@ -69,11 +73,17 @@ __all__ = [
     "Layout",
     "LinkError",
     "NoEquilibrium",
-    "RigidContact",
-    "Shape",
     "Overtaken",
+    "Played",
+    "Playing",
+    "Repeat",
+    "RigidContact",
+    "Sequence",
+    "Settled",
+    "Shape",
     "Skin",
     "State",
+    "Step",
     "StoreInfo",
     "Table",
     "WrongDevice",
@@ -86,6 +96,7 @@ __all__ = [
     "fit_yeoh",
     "preset",
     "read_csv",
+    "sequences",
 ]
 
 

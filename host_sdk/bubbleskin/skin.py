@@ -14,8 +14,10 @@ from bubbleskin.layout import Layout
 from bubbleskin.link.session import Link, drive
 from bubbleskin.link.transport import Transport
 from bubbleskin.link.wire import Received, crc32
+from bubbleskin.playing import Played, Player, Playing, Progress
 from bubbleskin.records import Health, Info, State, TickHistogram
 from bubbleskin.shape.heightfield import Heights, sample
+from bubbleskin.shape.sequence import Playable
 from bubbleskin.stored import Figures, StoreInfo
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ class AsyncSkin:
         self.simulated = simulated
         self._telemetry = 0  # number of the newest telemetry iterator
         link.on_open = self._opened
+        self._player = Player(link, info, layout)
 
     @classmethod
     async def open(
@@ -147,6 +150,24 @@ class AsyncSkin:
                 with contextlib.suppress(LinkError):
                     await link.call("SUBSCRIBE", (0,))
             raise
+
+    async def play(
+        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress = lambda playing: None
+    ) -> Played | None:
+        """See `Skin.play`."""
+        return await self._player.play(sequence, at, wait, progress)
+
+    async def playing(self) -> Playing:
+        """See `Skin.playing`."""
+        return await self._player.state()
+
+    async def pause(self) -> None:
+        """See `Skin.pause`."""
+        await self._player.control(messages.PAUSE)
+
+    async def resume(self) -> None:
+        """See `Skin.resume`."""
+        await self._player.control(messages.RESUME)
 
     async def stop(self) -> None:
         """See `Skin.stop`."""
@@ -313,8 +334,33 @@ class Skin:
         finally:
             drive(states.aclose())
 
+    def play(
+        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress = lambda playing: None
+    ) -> Played | None:
+        """Play a sequence by the device's own clock; it takes over from whatever the bubbles did before.
+
+        `sequence`: a `Sequence`, something that has one (a `Plan`), or the path of a .json or .csv file. It is checked
+        against this device before a byte is sent, and again there. `at`: device time in s, as of `state().time`, at
+        which to begin; None is now, and a time that has passed is refused. With `wait`, follows it to its end, tells
+        `progress` of every step, and returns when each began; raises `DeviceFault` where it does not come to its end:
+        stopped, vented, a timeout after which it was not to go on. Without, returns None once it has been started.
+        """
+        return drive(self._skin.play(sequence, at, wait, progress))
+
+    def playing(self) -> Playing:
+        """How far the sequence is that was played last, or how it ended."""
+        return drive(self._skin.playing())
+
+    def pause(self) -> None:
+        """Let the sequence and its ramps stand still; the shape of this moment is held."""
+        drive(self._skin.pause())
+
+    def resume(self) -> None:
+        """Go on with a sequence that was paused, from where it was."""
+        drive(self._skin.resume())
+
     def stop(self) -> None:
-        """Close all valves and keep the air, until the next `show`."""
+        """Close all valves and keep the air, until the next `show` or `play`; ends a sequence."""
         drive(self._skin.stop())
 
     def vent(self) -> None:

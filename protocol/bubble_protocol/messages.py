@@ -16,12 +16,15 @@ HELLO, PING, INFO, SHOW, STATE, SUBSCRIBE, TELEMETRY = 0x01, 0x02, 0x03, 0x04, 0
 TABLE_WRITE, TABLE_COMMIT, TABLE_READ, STOP, VENT, CLEAR = 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D
 TICKS, RESTART = 0x0E, 0x0F
 STORE_SAVE, STORE_INFO, STORE_RESET, FIGURES_WRITE, FIGURES_READ = 0x16, 0x17, 0x18, 0x19, 0x1A
+SEQUENCE_BEGIN, SEQUENCE_WRITE, SEQUENCE_ARM, SEQUENCE_START = 0x20, 0x21, 0x22, 0x23
+SEQUENCE_CONTROL, SEQUENCE_STATE, SEQUENCE_EVENT = 0x24, 0x25, 0x26
 ERROR = 0x7F
 
 # What ERROR says went wrong.
 UNKNOWN_MESSAGE, WRONG_LENGTH, OUT_OF_RANGE, WRONG_COUNT, BAD_TABLE, BAD_CRC, NO_COMMON_PROTOCOL, FAULTED = range(1, 9)
 BOARD_FAULT, OVERTAKEN = 9, 10
 NOT_VENTED, STORE_FOREIGN, STORE_FAILED = 15, 16, 17
+WRONG_BOARD, BAD_STEP, BAD_LOOP, OUT_OF_ORDER, NO_ROOM, NOT_READY, TOO_LATE = range(18, 25)
 ERRORS = (
     (UNKNOWN_MESSAGE, "unknown_message", "no message has this id"),
     (WRONG_LENGTH, "wrong_length", "the payload is too short or too long: asked bytes, low to high allowed"),
@@ -40,13 +43,38 @@ ERRORS = (
         "a slot holds what newer firmware or another board has stored, and is left alone until STORE_RESET",
     ),
     (STORE_FAILED, "store_failed", "flash does not hold what was written, or there is none; what was stored still is"),
+    (WRONG_BOARD, "wrong_board", "the sequence is for a board of another name"),
+    (
+        BAD_STEP,
+        "bad_step",
+        "a record of a sequence is not sound: element is the record in this message, field the word in the record "
+        "(0 flags, 1 ramp, 2 time or timeout, 3 tolerance, from 4 on targets), asked, low, high",
+    ),
+    (
+        BAD_LOOP,
+        "bad_loop",
+        "repeats and ends do not fit: element is the record in this message, asked the depth, high the most",
+    ),
+    (
+        OUT_OF_ORDER,
+        "out_of_order",
+        "records come one after the other: asked is the first sent, low = high the one expected",
+    ),
+    (NO_ROOM, "no_room", "more records than are left: asked are the records sent, high what is left"),
+    (
+        NOT_READY,
+        "not_ready",
+        "not now, or not this sequence: asked is the state, low the records received, high those in all",
+    ),
+    (TOO_LATE, "too_late", "the tick to start at has passed: asked, low the next one"),
 )
 
 # Bits of `capabilities`.
-DELIVERY, STORE = 1, 4
+DELIVERY, STORE, CAN_SEQUENCES = 1, 4, 8
 CAPABILITIES = (
     (DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),
     (STORE, "store", "tables, settings and figures can be stored"),
+    (CAN_SEQUENCES, "sequences", "sequences are played on the device's own clock"),
 )
 
 # What the board as a whole is doing.
@@ -131,6 +159,47 @@ RESTARTS = (
     (PROMPT, "prompt", "MicroPython's prompt"),
 )
 
+# What has become of the sequence in memory.
+EMPTY, LOADING, ARMED, WAITING, PLAYING, PAUSED, ENDED = range(7)
+SEQUENCE_STATES = (
+    (EMPTY, "empty", "there is none"),
+    (LOADING, "loading", "records are awaited"),
+    (ARMED, "armed", "checked, may be started"),
+    (WAITING, "waiting", "will start at its tick"),
+    (PLAYING, "playing", "its steps are executed"),
+    (PAUSED, "paused", "its time stands still, the setpoints too"),
+    (ENDED, "ended", "see the reason; may be armed again, if it was no stream"),
+)
+
+# How a step or the whole sequence ended.
+UNENDED, BY_TIME, BY_SETTLING, BY_TIMEOUT, COMPLETE, CANCELLED, UNDERRUN = range(7)
+SEQUENCE_REASONS = (
+    (UNENDED, "unended", "it has not"),
+    (BY_TIME, "by_time", "its time had come"),
+    (BY_SETTLING, "by_settling", "every bubble was within the tolerance"),
+    (BY_TIMEOUT, "by_timeout", "the bubbles named in unsettled were not, until its timeout"),
+    (COMPLETE, "complete", "all steps have been played"),
+    (CANCELLED, "cancelled", "SHOW, STOP, VENT, another sequence or a fault that vents came"),
+    (UNDERRUN, "underrun", "the next record of a stream had not come: the last shape is held"),
+)
+
+# What SEQUENCE_EVENT tells.
+STEP_BEGUN, SEQUENCE_PAUSED, SEQUENCE_RESUMED, SEQUENCE_ENDED = range(4)
+SEQUENCE_EVENTS = (
+    (STEP_BEGUN, "step_begun", "a step begins; reason and unsettled are those of the step before it"),
+    (SEQUENCE_PAUSED, "sequence_paused", "time stands still"),
+    (SEQUENCE_RESUMED, "sequence_resumed", "and goes on"),
+    (SEQUENCE_ENDED, "sequence_ended", "reason says why; unsettled is the last step's"),
+)
+
+# What SEQUENCE_CONTROL does.
+PAUSE, RESUME, END = range(3)
+SEQUENCE_ACTIONS = (
+    (PAUSE, "pause", "let its time and the setpoints stand still"),
+    (RESUME, "resume", "go on from there"),
+    (END, "end", "end it as STOP does"),
+)
+
 _TICKS = ("ticks", U32, "ticks", None, None, "device time: ticks since boot")
 _BUBBLES = (
     ("height_um", U16, "µm", None, None, "estimated height"),
@@ -139,6 +208,17 @@ _BUBBLES = (
     ("status", U8, "", None, None, "see bubble status"),
     ("faults", U8, "", None, None, "see faults, bits"),
 )
+_SEQUENCE = ("sequence", U16, "", None, None, "the host's number for this sequence")
+_RECORD = ("record", U32, "", None, None, "the step's record, counted from 0")
+_UNSETTLED = (
+    "unsettled",
+    U32,
+    "",
+    None,
+    None,
+    "bubbles, as bits, that were not there when a step ended by its timeout",
+)
+_FREE = ("free", U16, "records", None, None, "records that there is room for")
 _KNOTS = (
     ("knot_um", U16, "µm", 1, None, "height of a knot"),
     ("knot_pa", U16, "Pa", None, None, "gauge pressure that holds it"),
@@ -382,6 +462,99 @@ MESSAGES = (
     (FIGURES_WRITE | REPLY, "FIGURES_WRITE_REPLY", (_TICKS,), (), "figures in use"),
     (FIGURES_READ, "FIGURES_READ", (), (), "what figures are in use?"),
     (FIGURES_READ | REPLY, "FIGURES_READ_REPLY", (), _FIGURES, "the figures in use, one entry per bubble"),
+    (
+        SEQUENCE_BEGIN,
+        "SEQUENCE_BEGIN",
+        (
+            _SEQUENCE,
+            ("bubbles", U8, "", None, None, "how many bubbles its records have"),
+            ("board_crc", U32, "", None, None, "CRC-32 of the name of the board that it is for; 0: any"),
+            ("records", U32, "records", None, None, "in all; more than the memory holds: a stream; 0: one without end"),
+            ("crc", U32, "", None, None, "CRC-32 of all its records' words; not looked at in a stream"),
+        ),
+        (),
+        "make room for a sequence; one that runs is cancelled and the bubbles are held where they are",
+    ),
+    (
+        SEQUENCE_BEGIN | REPLY,
+        "SEQUENCE_BEGIN_REPLY",
+        (_TICKS, _FREE, ("capacity", U16, "records", None, None, "records that fit into the memory")),
+        (),
+        "records may come",
+    ),
+    (
+        SEQUENCE_WRITE,
+        "SEQUENCE_WRITE",
+        (_SEQUENCE, ("first", U16, "records", None, None, "number of the first record in this message, modulo 65536")),
+        (("word", U16, "", None, None, "whole records, word by word; see Sequences"),),
+        "the next records of a sequence; all are checked before one is taken",
+    ),
+    (
+        SEQUENCE_WRITE | REPLY,
+        "SEQUENCE_WRITE_REPLY",
+        (_TICKS, _FREE, ("received", U32, "records", None, None, "records received so far")),
+        (),
+        "records taken",
+    ),
+    (SEQUENCE_ARM, "SEQUENCE_ARM", (_SEQUENCE,), (), "check that the sequence is whole, and the one that was sent"),
+    (SEQUENCE_ARM | REPLY, "SEQUENCE_ARM_REPLY", (_TICKS,), (), "may be started"),
+    (
+        SEQUENCE_START,
+        "SEQUENCE_START",
+        (_SEQUENCE, ("start_ticks", U32, "ticks", None, None, "device time of the first step; 0: the next tick")),
+        (),
+        "play the sequence that is armed; a start that has passed is refused",
+    ),
+    (
+        SEQUENCE_START | REPLY,
+        "SEQUENCE_START_REPLY",
+        (_TICKS, ("start_ticks", U32, "ticks", None, None, "device time of the first step")),
+        (),
+        "will start then",
+    ),
+    (
+        SEQUENCE_CONTROL,
+        "SEQUENCE_CONTROL",
+        (_SEQUENCE, ("action", U8, "", 0, 2, "see sequence action")),
+        (),
+        "pause, resume or end the sequence that runs",
+    ),
+    (SEQUENCE_CONTROL | REPLY, "SEQUENCE_CONTROL_REPLY", (_TICKS,), (), "done"),
+    (SEQUENCE_STATE, "SEQUENCE_STATE", (), (), "what has become of the sequence?"),
+    (
+        SEQUENCE_STATE | REPLY,
+        "SEQUENCE_STATE_REPLY",
+        (
+            _TICKS,
+            _SEQUENCE,
+            ("state", U8, "", None, None, "see sequence state"),
+            ("reason", U8, "", None, None, "see sequence reason"),
+            _RECORD,
+            ("begun_ticks", U32, "ticks", None, None, "when that step began"),
+            _UNSETTLED,
+            ("timeouts", U32, "steps", None, None, "how many steps so far ended by their timeout"),
+            ("received", U32, "records", None, None, "records received"),
+            _FREE,
+            ("capacity", U16, "records", None, None, "records that fit into the memory"),
+        ),
+        (),
+        "how far the sequence is, or how it ended",
+    ),
+    (
+        SEQUENCE_EVENT,
+        "SEQUENCE_EVENT",
+        (
+            _TICKS,
+            _SEQUENCE,
+            ("event", U8, "", None, None, "see sequence event"),
+            ("reason", U8, "", None, None, "see sequence reason"),
+            _RECORD,
+            _UNSETTLED,
+            _FREE,
+        ),
+        (),
+        "unasked: something has happened to the sequence, at this tick; the sequence number counts, so a gap is a loss",
+    ),
     (
         ERROR,
         "ERROR",

@@ -1,13 +1,15 @@
 """The firmware in this interpreter, on hands that follow a test's script."""
 
+import struct
+import zlib
 from itertools import pairwise
 
 import pytest
 
-from bubble_firmware import boards
+from bubble_firmware import boards, control
 from bubble_firmware.app import App
-from bubble_protocol import codec
-from bubble_protocol.messages import HELLO, PING
+from bubble_protocol import codec, messages, steps
+from bubble_protocol.messages import HELLO, PING, SEQUENCE_ENDED, STEP_BEGUN
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.link import wire
 
@@ -174,3 +176,127 @@ def rig(request):
 @pytest.fixture
 def rig7():
     return Rig("wristband7")
+
+
+class Sequencer:
+    """Sends sequences to a rig, and reads what it tells of them."""
+
+    def __init__(self, rig):
+        self.rig = rig
+        self.n = rig.board.BUBBLES
+        self.id = 7
+        self.size = steps.HEAD + self.n
+        self.told = []
+
+    @staticmethod
+    def step(*targets, ramp=0, after=0, tolerance=None, timeout=0, then=steps.GO_ON, easing=steps.LINEAR):
+        """One record: targets in µm, times in ms; with a tolerance it waits until settled."""
+        if tolerance is None:
+            return [steps.flags(easing, steps.TIME, 0), ramp, after, 0, *targets]
+        return [steps.flags(easing, steps.SETTLE, then), ramp, timeout, tolerance, *targets]
+
+    def record(self, words):
+        return (
+            (words + [0] * self.size)[: self.size]
+            if len(words) < 5
+            else words[:4] + words[4:] * (self.n if len(words) == 5 else 1)
+        )
+
+    def repeat(self, times):
+        return self.record([steps.REPEAT, times])
+
+    def end(self):
+        return self.record([steps.END])
+
+    def all(self, um, **how):
+        return self.record(self.step(um, **how))
+
+    def ask(self, name, *fixed, repeated=()):
+        """The answer to a request; events that come with it are kept."""
+        rig = self.rig
+        rig._sequence += 1
+        rig.hands.to_device += wire.encode(name, rig._sequence, fixed, repeated)
+        self.listen()
+        rig.app.tick()
+        return self.listen()
+
+    def listen(self):
+        answer = None
+        for message in self.rig.heard():
+            if message.id == messages.SEQUENCE_EVENT:
+                self.told.append(message)
+            else:
+                answer = message
+        return answer
+
+    def refusal(self, name, *fixed, repeated=()):
+        answer = self.ask(name, *fixed, repeated=repeated)
+        assert answer.id == messages.ERROR, f"{name} was not refused"
+        return tuple(answer[field] for field in ("error", "field", "element", "asked", "low", "high"))
+
+    def begin(self, total, crc=0, board=0, bubbles=None):
+        return self.ask("SEQUENCE_BEGIN", self.id, self.n if bubbles is None else bubbles, board, total, crc)
+
+    def write(self, first, records):
+        return self.ask("SEQUENCE_WRITE", self.id, first & 0xFFFF, repeated=[(w,) for r in records for w in r])
+
+    def upload(self, records, total=None):
+        words = [word for record in records for word in record]
+        total = len(records) if total is None else total
+        assert self.begin(total, zlib.crc32(struct.pack(f"<{len(words)}H", *words))).id != messages.ERROR
+        most = 121 // self.size
+        for first in range(0, len(records), most):
+            assert self.write(first, records[first : first + most]).id != messages.ERROR
+
+    def load(self, *records):
+        self.upload(list(records))
+        answer = self.ask("SEQUENCE_ARM", self.id)
+        assert answer.id == messages.SEQUENCE_ARM | messages.REPLY
+
+    def start(self, at=0):
+        answer = self.ask("SEQUENCE_START", self.id, at)
+        assert answer.id == messages.SEQUENCE_START | messages.REPLY
+        return answer["start_ticks"]
+
+    def play(self, *records):
+        self.load(*records)
+        return self.start()
+
+    def tick(self, ticks=1):
+        for _ in range(ticks):
+            self.rig.app.tick()
+            answer = self.listen()
+            assert answer is None
+
+    def until_ended(self, most=20000):
+        for _ in range(most):
+            if self.told and self.told[-1]["event"] == SEQUENCE_ENDED:
+                return
+            self.tick()
+        raise AssertionError("the sequence has not ended")
+
+    @property
+    def events(self):
+        """(event, reason, record, tick) of all that was told."""
+        return [(one["event"], one["reason"], one["record"], one["ticks"]) for one in self.told]
+
+    def begun(self):
+        return [one["ticks"] for one in self.told if one["event"] == STEP_BEGUN]
+
+    def state(self):
+        return self.ask("SEQUENCE_STATE").fields
+
+    def setpoints(self):
+        """µm, where the ramps are now."""
+        rows = self.rig.app.bubbles._rows
+        return [rows[i * control.ROW + control.SETPOINT] / 16 for i in range(self.n)]
+
+
+@pytest.fixture
+def sequencer(rig):
+    return Sequencer(rig)
+
+
+@pytest.fixture
+def seven(rig7):
+    return Sequencer(rig7)

@@ -1,9 +1,12 @@
 """On MicroPython the tick allocates nothing: a collection takes longer than a tick."""
 
+import struct
+import zlib
+
 import pytest
 
 from bubble_firmware import boards
-from bubble_protocol import framing, messages
+from bubble_protocol import framing, messages, steps
 from bubble_protocol.crc import crc32_into
 from bubbleskin.link import wire
 
@@ -119,7 +122,7 @@ gc.collect()
 gc.disable()
 grown = measure(app, hands)
 decoder = app.session._decoder
-print(grown, app.exceptions, decoder.good, hands.sent, hands.fills, hands.vents, hands.rests)
+print(grown, app.exceptions, decoder.good, hands.sent, hands.fills, hands.vents, hands.rests, app.player.number)
 print(app.store.wear[0], app.store.wear[1])
 
 exceptions = app.exceptions
@@ -131,6 +134,14 @@ print(measure(app, hands), app.exceptions - exceptions, hands.safe)
 ACTIVE = ("SUBSCRIBE", "SHOW up", "STATE", "PING", "INFO", "SHOW down", "PING", "STATE", "INFO")
 OUT_OF_ORDER = ("SUBSCRIBE", "SHOW up", "STATE", "INFO", "SHOW down", "STATE", "STOP ahead", "STATE")
 SAVING = ("FIGURES_WRITE", "STORE_SAVE", "FIGURES_READ", "FIGURES other", "STORE_SAVE", "STORE_INFO")
+SEQUENCE = ("SEQUENCE_BEGIN", "SEQUENCE_WRITE", "SEQUENCE_ARM", "SEQUENCE_START", "SEQUENCE_STATE", *["PING"] * 20)
+SEQUENCE += (
+    "SEQUENCE_CONTROL pause",
+    "SEQUENCE_STATE",
+    "SEQUENCE_CONTROL resume",
+    *["STATE"] * 10,
+    "SEQUENCE_CONTROL end",
+)
 SEQUENCES = [
     pytest.param(ACTIVE, id="active"),
     pytest.param(("SHOW up", "HELLO", "STOP", "SHOW down", "VENT", "CLEAR", "TABLE_READ"), id="everything"),
@@ -139,6 +150,8 @@ SEQUENCES = [
     pytest.param(OUT_OF_ORDER, id="out of order, twice, overtaken"),
     pytest.param(("STORE_INFO", "FIGURES_READ", "SHOW up", "STORE_SAVE", "FIGURES_WRITE"), id="store"),
     pytest.param(SAVING, id="saving"),
+    pytest.param(SEQUENCE, id="sequence"),
+    pytest.param(("SEQUENCE_BEGIN stream", "SEQUENCE_WRITE stream", *SEQUENCE[1:5], "SHOW up"), id="sequences refused"),
 ]
 SESSIONS = 17
 """One more than the device remembers: the first may come again after the last."""
@@ -173,6 +186,17 @@ def request(name, n, number, session):
         "wrong length": wrong_length,
         "unknown": lambda: of("PING_REPLY", (0xFEDCBA98, 1, 1)),
     }
+    requests |= {
+        "SEQUENCE_BEGIN": lambda: of("SEQUENCE_BEGIN", (3, n, 0, 5, program_crc(n))),
+        "SEQUENCE_WRITE": lambda: of("SEQUENCE_WRITE", (3, 0), program(n)),
+        "SEQUENCE_ARM": lambda: of("SEQUENCE_ARM", (3,)),
+        "SEQUENCE_START": lambda: of("SEQUENCE_START", (3, 0)),
+        "SEQUENCE_CONTROL pause": lambda: of("SEQUENCE_CONTROL", (3, messages.PAUSE)),
+        "SEQUENCE_CONTROL resume": lambda: of("SEQUENCE_CONTROL", (3, messages.RESUME)),
+        "SEQUENCE_CONTROL end": lambda: of("SEQUENCE_CONTROL", (3, messages.END)),
+        "SEQUENCE_BEGIN stream": lambda: of("SEQUENCE_BEGIN", (4, n, 0, 0, 0xFFFFFFFF)),
+        "SEQUENCE_WRITE stream": lambda: of("SEQUENCE_WRITE", (4, 0), program(n)),
+    }
     return requests[name]() if name in requests else of(name)
 
 
@@ -194,6 +218,28 @@ def rounds(sequence, n):
         yield b"".join(frames)
 
 
+def program(n):
+    """A repeat of a ramp, of a step that waits until settled, and of one that only waits: words."""
+    up = [steps.flags(steps.SMOOTH, steps.TIME, 0), 90, 30, 0, *[6000 + 900 * bubble % 8000 for bubble in range(n)]]
+    down = [
+        steps.flags(steps.OUT, steps.SETTLE, steps.GO_ON),
+        50,
+        100,
+        300,
+        *[13000 - 700 * bubble % 8000 for bubble in range(n)],
+    ]
+    wait = [steps.flags(steps.LINEAR, steps.TIME, 0), 0, 15, 0, *[steps.LEAVE] * n]
+    blank = [0] * (n + 2)
+    return [
+        (word,) for record in ([steps.REPEAT, 0, *blank], up, down, wait, [steps.END, 0, *blank]) for word in record
+    ]
+
+
+def program_crc(n):
+    words = [word for (word,) in program(n)]
+    return zlib.crc32(struct.pack(f"<{len(words)}H", *words))
+
+
 @pytest.mark.parametrize("sequence", SEQUENCES)
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])
 def test_the_tick_allocates_nothing(micropython, board, sequence):
@@ -203,7 +249,7 @@ def test_the_tick_allocates_nothing(micropython, board, sequence):
     said, wear, failing = micropython(
         SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=17, ticks=ticks)
     ).splitlines()
-    grown, exceptions, good, sent, fills, vents, rests = map(int, said.split())
+    grown, exceptions, good, sent, fills, vents, rests, events = map(int, said.split())
     assert exceptions == 0, "MemoryError while the heap was locked"
     assert grown == 0
     assert good > ticks // 8
@@ -214,6 +260,8 @@ def test_the_tick_allocates_nothing(micropython, board, sequence):
     assert safe >= ticks
     if sequence == SAVING:
         assert min(map(int, wear.split())) > 5, "flash was written, both slots in turn"
+    if sequence == SEQUENCE:
+        assert events > 100, "steps were played"
     if sequence == ACTIVE:
         assert sent > good, "telemetry and every reply"
         assert min(fills, vents, rests) > 4000 * n // 20, "valves of both kinds are at work"

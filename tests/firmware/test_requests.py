@@ -113,7 +113,7 @@ def test_hello_introduces_the_board(rig):
         "height_max_um": board.HEIGHT_MAX_UM,
         "pressure_max_pa": board.PRESSURE_MAX_PA,
         "window": 8,
-        "capabilities": messages.DELIVERY,
+        "capabilities": messages.DELIVERY | messages.STORE | messages.CAN_SEQUENCES,
         "tables_crc": zlib.crc32(np.array(nominal.KNOTS, "<u2").tobytes() * board.BUBBLES),
     }
 

@@ -4,14 +4,14 @@ import pytest
 
 from bubble_firmware import boards
 from bubble_firmware.requests import _KNOTS_PER_MESSAGE
-from bubble_protocol import codec, messages
+from bubble_protocol import codec, messages, steps
 from bubble_protocol.framing import PAYLOAD_MAX
 from bubble_protocol.messages import I32, MESSAGES, REPLY, TEXT, U8, U16, U32
 from bubbleskin.link import wire
 from bubbleskin.sim.board import BOARDS
 
 RANGES = {U8: (0, 0xFF), U16: (0, 0xFFFF), U32: (0, 0xFFFFFFFF), I32: (-(1 << 31), (1 << 31) - 1)}
-UNASKED = {messages.TELEMETRY, messages.ERROR}
+UNASKED = {messages.TELEMETRY, messages.ERROR, messages.SEQUENCE_EVENT}
 BUBBLES = 24  # the largest board a frame has room for
 
 FIELDS = [
@@ -81,6 +81,7 @@ def test_names_of_fields_are_unique_in_a_message():
         ("TABLE_READ_REPLY", 48),
         ("FIGURES_WRITE", BUBBLES),
         ("FIGURES_READ_REPLY", BUBBLES),
+        ("SEQUENCE_WRITE", steps.HEAD + BUBBLES),
     ],
 )
 def test_a_frame_has_room_for_every_bubble(name, entries):
@@ -100,11 +101,20 @@ def test_telemetry_is_an_unasked_state():
     assert codec.BY_NAME["TELEMETRY"].repeated == codec.BY_NAME["STATE_REPLY"].repeated
 
 
-@pytest.mark.parametrize(
-    "table",
-    [messages.ERRORS, messages.MODES, messages.STATUSES, messages.STORES, messages.SLOTS],
-    ids=["errors", "modes", "statuses", "stores", "slots"],
-)
+ENUMERATIONS = {
+    "modes": messages.MODES,
+    "statuses": messages.STATUSES,
+    "stores": messages.STORES,
+    "slots": messages.SLOTS,
+    "sequence states": messages.SEQUENCE_STATES,
+    "sequence reasons": messages.SEQUENCE_REASONS,
+    "sequence events": messages.SEQUENCE_EVENTS,
+    "sequence actions": messages.SEQUENCE_ACTIONS,
+    "errors": messages.ERRORS,  # allotted in blocks
+}
+
+
+@pytest.mark.parametrize("table", ENUMERATIONS.values(), ids=list(ENUMERATIONS))
 def test_an_enumeration_counts_on(table):
     first = table[0][0]
     assert first in (0, 1)

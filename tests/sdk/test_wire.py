@@ -173,6 +173,42 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
             error(messages.OVERTAKEN),
             "The wristband refused SHOW: a later STOP or VENT has overtaken it. It was not applied.",
         ),
+        (
+            error(messages.WRONG_BOARD, request=messages.SEQUENCE_BEGIN),
+            "The wristband refused SEQUENCE_BEGIN: the sequence is for other hardware. Make one for this board.",
+        ),
+        (
+            error(messages.BAD_STEP, request=messages.SEQUENCE_WRITE, field=6, element=1, asked=15000, high=14000),
+            "The wristband refused SEQUENCE_WRITE: the target (µm) of bubble 2 of record 1 in this message is 15000; "
+            "0 to 14000 is allowed.",
+        ),
+        (
+            error(messages.BAD_STEP, request=messages.SEQUENCE_WRITE, field=1, element=0, asked=60001, high=60000),
+            "The wristband refused SEQUENCE_WRITE: the ramp (ms) of record 0 in this message is 60001; 0 to 60000 is allowed.",
+        ),
+        (
+            error(messages.BAD_LOOP, request=messages.SEQUENCE_WRITE, field=255, element=2, asked=5, high=4),
+            "The wristband refused SEQUENCE_WRITE: repeats and their ends do not fit at record 2: depth 5, 0 to 4 is "
+            "allowed, and none is empty.",
+        ),
+        (
+            error(messages.OUT_OF_ORDER, request=messages.SEQUENCE_WRITE, asked=9, low=5, high=5),
+            "The wristband refused SEQUENCE_WRITE: record 9 came where 5 was expected. Upload again.",
+        ),
+        (
+            error(messages.NO_ROOM, request=messages.SEQUENCE_WRITE, asked=9, high=5),
+            "The wristband refused SEQUENCE_WRITE: 9 records, with room for 5. Send what there is room for.",
+        ),
+        (
+            error(messages.NOT_READY, request=messages.SEQUENCE_ARM, asked=messages.LOADING, low=3, high=5),
+            "The wristband refused SEQUENCE_ARM: its sequence is loading, with 3 of 5 records, or is another one. "
+            "Upload the sequence and arm it first.",
+        ),
+        (
+            error(messages.TOO_LATE, request=messages.SEQUENCE_START, asked=7, low=100),
+            "The wristband refused SEQUENCE_START: tick 7, at which to start, has passed; the next is 100. Start later, "
+            "or at once.",
+        ),
         (error(200), "The wristband refused SHOW with error 200."),
     ],
 )
@@ -183,7 +219,9 @@ def test_every_refusal_has_its_sentence(received, sentence):
 def test_every_error_of_the_schema_is_explained():
     explained = {messages.UNKNOWN_MESSAGE, messages.WRONG_LENGTH, messages.OUT_OF_RANGE, messages.WRONG_COUNT}
     explained |= {messages.BAD_TABLE, messages.BAD_CRC, messages.NO_COMMON_PROTOCOL, messages.FAULTED}
-    explained |= {messages.BOARD_FAULT, messages.OVERTAKEN}
+    explained |= {messages.BOARD_FAULT, messages.OVERTAKEN, messages.WRONG_BOARD, messages.BAD_STEP, messages.BAD_LOOP}
+    explained |= {messages.OUT_OF_ORDER, messages.NO_ROOM, messages.NOT_READY, messages.TOO_LATE}
+    explained |= {messages.NOT_VENTED, messages.STORE_FOREIGN, messages.STORE_FAILED}
     assert explained == {code for code, _, _ in messages.ERRORS}
 
 

@@ -13,6 +13,8 @@ SUPPLY_PA = 60000
 SUPPLY_MAX_PA = 75000
 SUPPLY_LOW_PA = 45000  # less for long and the supply is lost: a bubble at its limit could not be filled
 
+SEQUENCE_BYTES = 49152  # memory for the steps of a sequence
+
 # Sensors: counts to pascals.
 SENSOR_ZERO = 160
 SENSOR_PA_PER_COUNT = 17

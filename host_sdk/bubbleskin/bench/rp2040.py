@@ -109,7 +109,9 @@ def _control_rows(board: str) -> Iterator[Row]:
     floats = replay(board, ticks, bare, source + _FLOAT.format(curves=curves(board)))
     same = float(np.mean(np.abs(fixed.pulses - floats.pulses) <= _SAME_US))
     if same < 0.95:
-        raise BubbleskinError(f"The law in floats decides otherwise in {1 - same:.0%} of all pulses: it is another law.")
+        raise BubbleskinError(
+            f"The law in floats decides otherwise in {1 - same:.0%} of all pulses: it is another law."
+        )
     bubbles = fixed.pulses.shape[1] // 2
     phase = np.array([tick.phase for tick in ticks])
     for name, *_ in _PHASES:
@@ -159,7 +161,11 @@ def tick_rows(name: str, seconds: float = 5.0) -> Iterator[Row]:
     label = f"{name}, whole tick under load"
     yield Row(f"{label}: mean at most", busy.mean_us, "µs emulated", target)
     yield Row(f"{label}: longest at most", busy.worst_us, "µs emulated")
-    yield Row(f"{label}: of {limit / {800: 0.4, 3000: 0.6}[limit]:.0f} µs", busy.mean_us / limit * {800: 40, 3000: 60}[limit], "%")
+    yield Row(
+        f"{label}: of {limit / {800: 0.4, 3000: 0.6}[limit]:.0f} µs",
+        busy.mean_us / limit * {800: 40, 3000: 60}[limit],
+        "%",
+    )
     yield Row(f"{label}: ticks that began late", busy.late, f"of {busy.ticks}", "0")
     yield Row(f"{label}: heap lost", busy.heap_lost, "bytes", "0")
     if name == "wristband7":

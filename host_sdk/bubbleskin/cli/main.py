@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from bubbleskin.cli import bench, device, firmware, flash, membrane, plot, sim, store
+from bubbleskin.cli import bench, device, firmware, flash, membrane, play, plot, sim, store
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 
@@ -17,6 +17,7 @@ def bubbleskin() -> None:
 
 for _command in (
     *device.commands,
+    *play.commands,
     *store.commands,
     *sim.commands,
     *membrane.commands,

@@ -46,6 +46,8 @@ class Link:
         self.telemetry: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
         self.on_open: Callable[[wire.Received], None] | None = None
         self.on_ping: Callable[[float, wire.Received, float], None] | None = None
+        self.events: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
+        """What has happened to a sequence, as the device told it."""
         self._event_loop = event_loop
         # The thread that keeps the link alive between calls must not read or write during one.
         self.guard: Any = contextlib.nullcontext() if event_loop or not transport.blocks else threading.RLock()
@@ -311,6 +313,8 @@ class Link:
             what = message["request"] if message.id == messages.ERROR else message.id & ~messages.REPLY
             if message.id == messages.TELEMETRY:
                 self.telemetry.append(message)
+            elif message.id == messages.SEQUENCE_EVENT:
+                self.events.append(message)
             elif what == messages.HELLO:
                 self._greeted(message)
             elif what == messages.PING:

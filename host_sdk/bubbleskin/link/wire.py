@@ -1,14 +1,14 @@
 """Messages as Python values: names and numbers to frames, bytes to received messages. No I/O, no clock."""
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import crcmod.predefined
 import numpy as np
 from numpy.typing import NDArray
 
-from bubble_protocol import codec, framing, messages
+from bubble_protocol import codec, framing, messages, steps
 
 _crc32 = crcmod.predefined.mkPredefinedCrcFun("crc-32")
 
@@ -122,6 +122,46 @@ class Reader:
         return Received(decoder.message_id, decoder.sequence, fields, columns)
 
 
+_WORDS = ("flags", "ramp (ms)", "time or timeout (ms)", "tolerance (µm)")
+
+
+def _bad_step(error: Received) -> str:
+    field = error["field"]
+    word = _WORDS[field] if field < steps.HEAD else f"target (µm) of bubble {field - steps.HEAD}"
+    return (
+        f"the {word} of record {error['element']} in this message is {error['asked']}; "
+        f"{error['low']} to {error['high']} is allowed."
+    )
+
+
+def _not_ready(error: Received) -> str:
+    state = {number: name for number, name, _ in messages.SEQUENCE_STATES}.get(error["asked"], "unknown")
+    return (
+        f"its sequence is {state}, with {error['low']} of {error['high']} records, or is another one. "
+        "Upload the sequence and arm it first."
+    )
+
+
+_OF_SEQUENCES: dict[int, Callable[[Received], str]] = {
+    messages.WRONG_BOARD: lambda error: "the sequence is for other hardware. Make one for this board.",
+    messages.BAD_STEP: _bad_step,
+    messages.BAD_LOOP: lambda error: (
+        f"repeats and their ends do not fit at record {error['element']}: depth {error['asked']}, "
+        f"0 to {error['high']} is allowed, and none is empty."
+    ),
+    messages.OUT_OF_ORDER: lambda error: (
+        f"record {error['asked']} came where {error['low']} was expected. Upload again."
+    ),
+    messages.NO_ROOM: lambda error: (
+        f"{error['asked']} records, with room for {error['high']}. Send what there is room for."
+    ),
+    messages.NOT_READY: _not_ready,
+    messages.TOO_LATE: lambda error: (
+        f"tick {error['asked']}, at which to start, has passed; the next is {error['low']}. Start later, or at once."
+    ),
+}
+
+
 def explain(error: Received) -> str:
     """A sentence for an ERROR message, from the schema: what was refused, which field, what is allowed."""
     request = codec.BY_ID.get(error["request"])
@@ -164,6 +204,8 @@ def explain(error: Received) -> str:
         )
     if code == messages.STORE_FAILED:
         return f"The wristband refused {name}: its flash does not hold what was written, or it has none for a store."
+    if code in _OF_SEQUENCES:
+        return f"The wristband refused {name}: {_OF_SEQUENCES[code](error)}"
     if code == messages.UNKNOWN_MESSAGE:
         return f"The wristband does not know {name}: its firmware is older than this SDK. Update the firmware."
     return f"The wristband refused {name} with error {code}."

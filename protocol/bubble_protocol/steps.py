@@ -1,0 +1,222 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
+"""Steps of a sequence on the wire and in the device's memory: records of 16-bit words, and what makes one sound.
+
+| word | of a step | of a repeat |
+|---|---|---|
+| 0 | kind (bits 0, 1), easing (2, 3), until (4), then (5, 6) | kind alone |
+| 1 | ramp, ms | times, 0: until it is stopped |
+| 2 | ms after the ramp: the time to go on, or the timeout | – |
+| 3 | tolerance, µm; 0 where it goes on by time | – |
+| 4 + i | target of bubble i, µm; LEAVE: as it is | – |
+
+A repeat stands before the records that it repeats and an end after them: there are no jumps, so what is properly
+nested cannot go round for ever without time passing. All of it runs on host and device.
+"""
+
+from bubble_protocol.crc import _TABLE
+from bubble_protocol.portable import const, micropython, ptr32
+
+STEP, REPEAT, END = range(3)
+LINEAR, SMOOTH, IN, OUT = range(4)
+TIME, SETTLE = range(2)
+GO_ON, HOLD, VENT, STOP = range(4)
+
+HEAD = 4  # words before the targets
+LEAVE = 0xFFFF
+MS_MAX = 60000
+TOLERANCE_MIN_UM = 50
+TOLERANCE_MAX_UM = 5000
+DEPTH_MAX = 4  # repeats within repeats
+
+LOOP = 255  # in place of a word's number: the nesting is wrong
+
+# What `first_flaw` works on.
+BUBBLES = 0
+HEIGHT_MAX = 1  # µm
+TICK_US = 2
+NESTS = 3  # whether repeats are allowed
+DEPTH = 4  # after the records found sound so far
+OPENED = 5  # whether the last of them was a repeat
+DEPTH_NEXT = 6  # the same after the records just looked at; `accept` makes them so
+OPENED_NEXT = 7
+ASKED = 8  # of the flaw
+LOW = 9
+HIGH = 10
+CRC = 11  # of all words accepted
+CHECK = 12
+
+# The same for viper, whose constants must be of this file.
+_HEAD = const(4)
+_LEAVE = const(0xFFFF)
+_MS_MAX = const(60000)
+_TOLERANCE_MIN = const(50)
+_TOLERANCE_MAX = const(5000)
+_DEPTH_MAX = const(4)
+_LOOP = const(255)
+_BUBBLES = const(0)
+_HEIGHT_MAX = const(1)
+_TICK_US = const(2)
+_NESTS = const(3)
+_DEPTH = const(4)
+_OPENED = const(5)
+_DEPTH_NEXT = const(6)
+_OPENED_NEXT = const(7)
+_ASKED = const(8)
+_LOW = const(9)
+_HIGH = const(10)
+_STEP = const(0)
+_REPEAT = const(1)
+_END = const(2)
+_FLAGS_MAX = const(127)
+_CRC = const(11)
+
+
+def flags(easing, until, then):
+    """Word 0 of a step."""
+    return STEP | easing << 2 | until << 4 | then << 5
+
+
+@micropython.viper
+def first_flaw(v: ptr32, c: ptr32, at: int, records: int) -> int:
+    """Look at the records from `v[at]` on: record * 256 + word of the first that is not sound, -1 where all are.
+
+    `c` is an array of CHECK integers; what was asked and what is allowed stands in its ASKED, LOW and HIGH.
+    """
+    n = c[_BUBBLES]
+    depth = c[_DEPTH]
+    opened = c[_OPENED]
+    record = 0
+    while record < records:
+        flag = v[at]
+        kind = flag & 3
+        wrong = -1
+        asked = 0
+        low = 0
+        high = 0
+        if kind == _STEP:
+            settle = flag >> 4 & 1
+            ms = v[at + 1] + v[at + 2]
+            least = (c[_TICK_US] + 999) // 1000  # a step takes a tick at least
+            i = 0
+            while i < n and wrong < 0:
+                if v[at + _HEAD + i] > c[_HEIGHT_MAX] and v[at + _HEAD + i] != _LEAVE:
+                    wrong = _HEAD + i
+                    high = c[_HEIGHT_MAX]
+                i += 1
+            if settle:
+                if v[at + 3] < _TOLERANCE_MIN or v[at + 3] > _TOLERANCE_MAX:
+                    wrong = 3
+                    low = _TOLERANCE_MIN
+                    high = _TOLERANCE_MAX
+            elif v[at + 3]:
+                wrong = 3
+                high = 0
+            if ms < least:
+                wrong = 2
+                low = least - v[at + 1]
+                high = _MS_MAX
+            if v[at + 2] > _MS_MAX:
+                wrong = 2
+                low = 0
+                high = _MS_MAX
+            if v[at + 1] > _MS_MAX:
+                wrong = 1
+                low = 0
+                high = _MS_MAX
+            if flag > _FLAGS_MAX or (settle == 0 and flag >> 5):
+                wrong = 0
+                low = 0
+                high = _FLAGS_MAX
+            if wrong >= 0:
+                asked = v[at + wrong]
+            opened = 0
+        else:
+            if kind == _REPEAT:
+                depth += 1
+            else:
+                depth -= 1
+            if flag > _END:
+                wrong = 0
+                asked = flag
+                high = _FLAGS_MAX
+            elif depth < 0 or depth > _DEPTH_MAX or c[_NESTS] == 0 or (kind == _END and opened):
+                wrong = _LOOP
+                asked = depth
+                high = _DEPTH_MAX if c[_NESTS] else 0
+            opened = 1 if kind == _REPEAT else 0
+        if wrong >= 0:
+            c[_ASKED] = asked
+            c[_LOW] = low
+            c[_HIGH] = high
+            return record * 256 + wrong
+        at += _HEAD + n
+        record += 1
+    c[_DEPTH_NEXT] = depth
+    c[_OPENED_NEXT] = opened
+    return -1
+
+
+@micropython.viper
+def _accept(v: ptr32, c: ptr32, t: ptr32, at: int, end: int):
+    crc = c[_CRC]
+    while at < end:
+        crc = (crc >> 8 & 0xFFFFFF) ^ t[(crc ^ v[at]) & 255]
+        crc = (crc >> 8 & 0xFFFFFF) ^ t[(crc ^ v[at] >> 8) & 255]
+        at += 1
+    c[_CRC] = crc
+    c[_DEPTH] = c[_DEPTH_NEXT]
+    c[_OPENED] = c[_OPENED_NEXT]
+
+
+def accept(words, check, at, end):
+    """Take the records at `words[at:end]`, just found sound, as received: nesting and CRC go on from there."""
+    _accept(words, check, _TABLE, at, end)
+
+
+def restart(check, nests):
+    """No record has been received yet."""
+    check[NESTS] = nests
+    check[DEPTH] = 0
+    check[OPENED] = 0
+    check[CRC] = -1
+
+
+@micropython.viper
+def has_crc(c: ptr32, v: ptr32, at: int) -> int:
+    """Whether `v[at]` is the CRC-32 of all words accepted, low byte first."""
+    return 1 if ~c[_CRC] == v[at] else 0
+
+
+@micropython.viper
+def same(a: ptr32, at: int, b: ptr32, bt: int) -> int:
+    """Whether two words are the same; read as integers of MicroPython they could be an allocation."""
+    return 1 if a[at] == b[bt] else 0
+
+
+@micropython.viper
+def keep(a: ptr32, at: int, b: ptr32, bt: int):
+    """Copy one word, whatever its size."""
+    b[bt] = a[at]
+
+
+@micropython.viper
+def small(v: ptr32, at: int) -> int:
+    """An unsigned word as a small integer; what is none becomes the greatest."""
+    word = v[at]
+    return 0x3FFFFFFF if word < 0 or word > 0x3FFFFFFF else word
+
+
+@micropython.viper
+def ease(done: int, of: int, easing: int) -> int:
+    """How far a ramp is after `done` of its ticks, in 1/32768, from 0 to 32768; at most 65535 ticks."""
+    if done >= of:
+        return 32768
+    p = done * 32768 // of
+    q = 32768 - p
+    if easing == 1:  # 3p² - 2p³
+        p = (p * p >> 15) * (98304 - 2 * p) >> 15
+    elif easing == 2:  # p²
+        p = p * p >> 15
+    elif easing == 3:  # 1 - (1 - p)²
+        p = 32768 - (q * q >> 15)
+    return p

@@ -1,0 +1,504 @@
+"""Sequences on the device: their schedule to the tick, conditions, repeats, streams, and everything that is refused."""
+
+import random
+import zlib
+
+import pytest
+
+from bubble_protocol import codec, messages, steps
+from bubble_protocol.messages import (
+    BY_SETTLING,
+    BY_TIME,
+    BY_TIMEOUT,
+    CANCELLED,
+    COMPLETE,
+    SEQUENCE_ENDED,
+    SEQUENCE_PAUSED,
+    SEQUENCE_RESUMED,
+    STEP_BEGUN,
+    UNDERRUN,
+    UNENDED,
+)
+
+WHOLE = 255
+
+
+# The schedule.
+
+
+def test_steps_begin_in_their_ticks(sequencer):
+    tick = sequencer.rig.board.TICK_US // 1000
+    start = sequencer.play(
+        sequencer.all(6000, ramp=100, after=50), sequencer.all(8000, ramp=30), sequencer.all(7000, after=200)
+    )
+    sequencer.until_ended()
+    assert sequencer.events == [
+        (STEP_BEGUN, UNENDED, 0, start),
+        (STEP_BEGUN, BY_TIME, 1, start + 150 // tick),
+        (STEP_BEGUN, BY_TIME, 2, start + 180 // tick),
+        (SEQUENCE_ENDED, COMPLETE, 2, start + 380 // tick),
+    ]
+    assert [one.sequence for one in sequencer.told] == [0, 1, 2, 3]
+
+
+def test_times_that_are_no_whole_ticks_do_not_drift(sequencer):
+    rng = random.Random(5)
+    lengths = [rng.randrange(11, 60) for _ in range(200)]
+    start = sequencer.play(*(sequencer.all(6000, ramp=ms // 3, after=ms - ms // 3) for ms in lengths))
+    sequencer.until_ended()
+    tick_us = sequencer.rig.board.TICK_US
+    due = [start + sum(lengths[:k]) * 1000 // tick_us for k in range(len(lengths))]
+    assert sequencer.begun() == due
+    assert sequencer.told[-1]["ticks"] == start + sum(lengths) * 1000 // tick_us
+
+
+def test_a_late_tick_changes_no_later_one(seven):
+    start = seven.play(*(seven.all(6000 + 100 * k, after=15) for k in range(40)))
+    seven.tick(20)
+    seven.rig.app.ticks += 30  # periods that nobody saw
+    seven.until_ended()
+    assert seven.begun()[-1] == start + 39 * 3
+    assert seven.rig.app.exceptions == 0
+
+
+def test_a_start_at_a_tick(sequencer):
+    sequencer.load(sequencer.all(9000, ramp=1000))
+    at = sequencer.rig.app.ticks + 50
+    assert sequencer.start(at) == at
+    sequencer.tick(20)
+    assert sequencer.state()["state"] == messages.WAITING
+    assert sequencer.rig.app.mode == messages.VENTED, "until then nothing happens"
+    sequencer.until_ended()
+    assert sequencer.begun() == [at]
+    assert sequencer.rig.app.mode == messages.ACTIVE
+
+
+def test_a_start_that_has_passed_is_refused(sequencer):
+    sequencer.load(sequencer.all(9000, ramp=1000))
+    now = sequencer.rig.app.ticks
+    assert sequencer.refusal("SEQUENCE_START", 7, now) == (messages.TOO_LATE, 1, WHOLE, now, now + 1, 0)
+    assert sequencer.refusal("SEQUENCE_START", 7, 1)[0] == messages.TOO_LATE
+    assert sequencer.state()["state"] == messages.ARMED
+    soon = sequencer.rig.app.ticks + 1
+    assert sequencer.start(soon) == soon
+
+
+# The way of a ramp.
+
+
+@pytest.mark.parametrize("easing", [steps.LINEAR, steps.SMOOTH, steps.IN, steps.OUT])
+def test_a_ramp_follows_its_easing(seven, easing):
+    way = {
+        steps.LINEAR: lambda p: p,
+        steps.SMOOTH: lambda p: 3 * p**2 - 2 * p**3,
+        steps.IN: lambda p: p**2,
+        steps.OUT: lambda p: 1 - (1 - p) ** 2,
+    }[easing]
+    seven.play(seven.all(12000, ramp=500, easing=easing, after=100), seven.all(6000, ramp=400, easing=easing))
+    for tick in range(1, 121):
+        seven.tick()
+        share = min(tick / 100, 1)
+        assert seven.setpoints() == pytest.approx([5000 + 7000 * way(share)] * 7, abs=3)
+    for tick in range(1, 80):
+        seven.tick()
+        assert seven.setpoints() == pytest.approx([12000 - 6000 * way(tick / 80)] * 7, abs=3)
+
+
+def test_a_target_left_out_stays(seven):
+    leave = steps.LEAVE
+    first = seven.record(seven.step(6000, 7000, 8000, 9000, 10000, 11000, 12000, after=50))
+    second = seven.record(seven.step(7000, leave, leave, leave, leave, leave, 0, ramp=100, after=500))
+    seven.play(first, second)
+    seven.tick(40)
+    assert seven.setpoints() == [7000, 7000, 8000, 9000, 10000, 11000, 5000]
+    assert seven.ask("STATE").columns["target_um"].tolist() == [7000, 7000, 8000, 9000, 10000, 11000, 5000]
+
+
+def test_a_target_below_rest_is_reached_at_the_end_of_the_ramp(seven):
+    seven.play(seven.all(12000, after=50), seven.all(0, ramp=500))
+    seven.tick(10 + 50)
+    assert seven.setpoints() == pytest.approx([8500] * 7, abs=80)
+
+
+# Conditions.
+
+
+def test_a_step_ends_when_all_are_settled(seven):
+    pressure = 22600  # 10 mm by the nominal table
+    seven.play(seven.all(10000, tolerance=300, timeout=5000), seven.all(6000, after=100))
+    seven.tick(100)
+    assert seven.begun()[1:] == []
+    for bubble in range(7):
+        seven.rig.sense(bubble, pressure)
+    seven.tick(300)
+    assert seven.events[1][:3] == (STEP_BEGUN, BY_SETTLING, 1)
+    assert seven.told[1]["unsettled"] == 0
+    assert seven.events[2][:3] == (SEQUENCE_ENDED, COMPLETE, 1)
+    assert seven.events[2][3] == seven.events[1][3] + 20
+
+
+def test_no_step_settles_before_its_ramp_has_ended(seven):
+    start = seven.play(seven.all(5000, ramp=400, tolerance=300, timeout=5000), seven.all(0, after=10))
+    seven.until_ended()
+    assert seven.events[1][1:] == (BY_SETTLING, 1, start + 80)
+
+
+THEN = {
+    steps.GO_ON: (STEP_BEGUN, messages.ACTIVE),
+    steps.HOLD: (SEQUENCE_ENDED, messages.ACTIVE),
+    steps.VENT: (SEQUENCE_ENDED, messages.VENTED),
+    steps.STOP: (SEQUENCE_ENDED, messages.HOLDING),
+}
+
+
+@pytest.mark.parametrize("then", THEN)
+def test_a_condition_that_never_comes_ends_by_its_timeout(seven, then):
+    event, mode = THEN[then]
+    targets = [5000, 10000, 5000, 5000, 10000, 5000, 5000]
+    start = seven.play(
+        seven.record(seven.step(*targets, ramp=100, tolerance=200, timeout=400, then=then)), seven.all(5000, after=1000)
+    )
+    seven.tick(110)
+    assert seven.events[1][:2] == (event, BY_TIMEOUT)
+    assert seven.events[1][3] == start + 100
+    assert seven.told[1]["unsettled"] == 0b0010010, "those that were not there are named"
+    assert seven.state()["timeouts"] == 1
+    assert seven.rig.app.mode == mode
+    if then == steps.HOLD:
+        assert seven.ask("STATE").columns["target_um"].tolist() == targets
+
+
+def test_a_bubble_with_a_fault_never_settles_and_the_others_go_on(seven):
+    seven.rig.hands.counts[2] = 0xFFFF
+    seven.tick(5)
+    seven.play(seven.all(5000, tolerance=200, timeout=300), seven.all(5000, after=50))
+    seven.until_ended()
+    assert seven.told[1]["reason"] == BY_TIMEOUT
+    assert seven.told[1]["unsettled"] == 1 << 2
+
+
+# Repeats.
+
+
+def unrolled(records):
+    """What a program of records plays, by recursion, unlike the device."""
+
+    def block(at):
+        played = []
+        while at < len(records) and records[at][0] != steps.END:
+            if records[at][0] == steps.REPEAT:
+                inner, end = block(at + 1)
+                played += inner * records[at][1]
+                at = end + 1
+            else:
+                played.append(at)
+                at += 1
+        return played, at
+
+    return block(0)[0]
+
+
+def random_program(rng, sequencer, depth=4, most=4):
+    records = []
+    for _ in range(rng.randrange(1, most)):
+        if depth and rng.random() < 0.4:
+            inner = random_program(rng, sequencer, depth - 1, 3)
+            records += [sequencer.repeat(rng.randrange(1, 4)), *inner, sequencer.end()]
+        else:
+            records.append(sequencer.all(rng.randrange(0, 14000), after=rng.randrange(10, 40)))
+    return records
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_repeats_play_what_they_say(seven, seed):
+    rng = random.Random(seed)
+    records = random_program(rng, seven)
+    start = seven.play(*records)
+    seven.until_ended()
+    order = unrolled(records)
+    assert [one["record"] for one in seven.told if one["event"] == STEP_BEGUN] == order
+    due, ms = [], 0
+    for record in order:
+        due.append(start + ms // 5)
+        ms += records[record][2]
+    assert seven.begun() == due
+
+
+def test_a_repeat_without_end_ends_when_it_is_stopped(seven):
+    seven.play(seven.repeat(0), seven.all(6000, after=20), seven.all(7000, after=20), seven.end())
+    seven.tick(800)
+    assert len(seven.begun()) == 200
+    assert seven.ask("SEQUENCE_CONTROL", 7, messages.END).id == messages.SEQUENCE_CONTROL | messages.REPLY
+    seven.tick()
+    assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
+    assert seven.rig.app.mode == messages.HOLDING
+
+
+# Pause, and what ends a sequence.
+
+
+def test_pause_stops_time_and_setpoints(seven):
+    start = seven.play(seven.all(12000, ramp=500), seven.all(6000, after=100))
+    seven.tick(39)
+    seven.ask("SEQUENCE_CONTROL", 7, messages.PAUSE)
+    still = seven.setpoints()
+    assert still == pytest.approx([5000 + 7000 * 0.4] * 7, abs=3)
+    assert seven.state()["state"] == messages.PAUSED
+    for _ in range(100):
+        seven.tick()
+        assert seven.setpoints() == still
+    seven.ask("SEQUENCE_CONTROL", 7, messages.PAUSE)  # twice is once
+    seven.ask("SEQUENCE_CONTROL", 7, messages.RESUME)
+    seven.tick()
+    assert seven.setpoints() == pytest.approx([5000 + 7000 * 0.41] * 7, abs=3)
+    seven.until_ended()
+    paused, resumed = (one["ticks"] for one in seven.told if one["event"] in (SEQUENCE_PAUSED, SEQUENCE_RESUMED))
+    assert seven.begun() == [start, start + 100 + resumed - paused]
+
+
+@pytest.mark.parametrize("name", ["SHOW", "STOP", "VENT"])
+@pytest.mark.parametrize("waiting", [False, True])
+def test_show_stop_and_vent_end_it(seven, name, waiting):
+    seven.load(seven.all(12000, ramp=500), seven.all(6000, ramp=500))
+    seven.start(seven.rig.app.ticks + 100 if waiting else 0)
+    seven.tick(50)
+    seven.ask(name, *((0,) if name == "SHOW" else ()), repeated=[(8000,)] * 7 if name == "SHOW" else ())
+    seven.tick(200)
+    assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
+    assert len(seven.begun()) == (0 if waiting else 1)
+    if name == "SHOW":
+        assert seven.setpoints() == [8000] * 7
+
+
+def test_an_emergency_stop_ends_it_and_forbids_another(seven):
+    seven.load(seven.all(12000, ramp=500))
+    seven.start()
+    seven.tick(10)
+    seven.rig.hands.alarms = messages.ESTOP
+    seven.tick(3)
+    assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
+    assert seven.rig.app.mode == messages.VENTED
+    seven.ask("SEQUENCE_ARM", 7)
+    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == messages.BOARD_FAULT
+
+
+def test_an_emergency_stop_before_the_start_forbids_it(seven):
+    seven.load(seven.all(12000, ramp=500))
+    seven.start(seven.rig.app.ticks + 50)
+    seven.rig.hands.alarms = messages.ESTOP
+    seven.tick(100)
+    assert seven.events == [(SEQUENCE_ENDED, CANCELLED, 0, seven.events[0][3])]
+    assert seven.rig.app.mode == messages.VENTED
+
+
+def test_it_can_be_armed_and_played_again(seven):
+    records = [seven.all(12000, ramp=50), seven.all(6000, ramp=50)]
+    seven.play(*records)
+    seven.until_ended()
+    seven.told.clear()
+    seven.ask("SEQUENCE_ARM", 7)
+    start = seven.start()
+    seven.until_ended()
+    assert seven.begun() == [start, start + 10]
+
+
+def test_another_takes_over_where_the_bubbles_are(seven):
+    seven.play(seven.all(12000, ramp=500))
+    seven.tick(50)
+    seven.load(seven.all(6000, after=100))
+    assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
+    assert seven.rig.app.mode == messages.ACTIVE
+    (held,) = set(seven.ask("STATE").columns["target_um"])
+    assert 5000 < held < 12000, "neither where they came from nor where they went"
+    seven.told.clear()
+    seven.start()
+    seven.until_ended()
+    assert seven.events[-1][1] == COMPLETE
+
+
+# Streams.
+
+
+@pytest.mark.slow
+def test_a_stream_plays_on_while_it_is_written(sequencer):
+    ring = sequencer.rig.app.player.sequence.capacity
+    most = 121 // sequencer.size
+    tick = sequencer.rig.board.TICK_US // 1000
+    total = 2 * ring + 17
+    records = [sequencer.all(5000 + k % 9000, after=tick) for k in range(total)]
+    sequencer.begin(total)
+    written = 0
+    while written < ring:
+        part = records[written : min(written + most, ring)]
+        assert sequencer.write(written, part)["received"] == written + len(part)
+        written += len(part)
+    assert (
+        sequencer.refusal("SEQUENCE_WRITE", 7, ring & 0xFFFF, repeated=[(w,) for w in records[ring]])[0]
+        == messages.NO_ROOM
+    )
+    sequencer.ask("SEQUENCE_ARM", 7)
+    start = sequencer.start()
+    while written < total:
+        part = records[written : written + most]
+        answer = sequencer.write(written, part)
+        if answer.id == messages.ERROR:
+            assert answer["error"] == messages.NO_ROOM
+            sequencer.tick(3)
+        else:
+            written += len(part)
+    sequencer.until_ended()
+    assert sequencer.events[-1] == (SEQUENCE_ENDED, COMPLETE, total - 1, start + total)
+    assert sequencer.begun() == list(range(start, start + total)), "no gap"
+
+
+def test_a_stream_that_runs_dry_is_held_and_says_so(seven):
+    ring = seven.rig.app.player.sequence.capacity
+    seven.begin(0)
+    written = 0
+    while written < ring:
+        part = min(11, ring - written)
+        seven.write(written, [seven.all(6000 + written, after=5)] * part)
+        written += part
+    seven.ask("SEQUENCE_ARM", 7)
+    start = seven.start()
+    seven.until_ended()
+    assert seven.events[-1] == (SEQUENCE_ENDED, UNDERRUN, ring - 1, start + ring)
+    assert seven.rig.app.mode == messages.ACTIVE
+    assert seven.setpoints() == [6000 + ring - ring % 11] * 7
+
+
+def test_a_stream_has_no_repeats(seven):
+    seven.begin(0)
+    error = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in seven.repeat(2)])
+    assert error == (messages.BAD_LOOP, WHOLE, 0, 1, 0, 0)
+
+
+# Refused.
+
+
+def test_what_is_for_other_hardware_is_refused(sequencer):
+    name = zlib.crc32(sequencer.rig.board.NAME.encode())
+    assert sequencer.begin(3, board=name).id != messages.ERROR
+    assert sequencer.begin(3, board=name ^ 1)["error"] == messages.WRONG_BOARD
+    n = sequencer.n
+    assert sequencer.begin(3, board=name, bubbles=n + 1)["error"] == messages.WRONG_COUNT
+    assert sequencer.state()["state"] == messages.LOADING, "refused, so nothing has changed"
+
+
+BAD = [
+    ({"ramp": 60001}, messages.BAD_STEP, 1, 60001, 0, 60000),
+    ({"after": 60001}, messages.BAD_STEP, 2, 60001, 0, 60000),
+    ({"after": 4}, messages.BAD_STEP, 2, 4, 5, 60000),
+    ({"tolerance": 49, "timeout": 100}, messages.BAD_STEP, 3, 49, 50, 5000),
+    ({"tolerance": 5001, "timeout": 100}, messages.BAD_STEP, 3, 5001, 50, 5000),
+    ({"tolerance": 100, "timeout": 0}, messages.BAD_STEP, 2, 0, 5, 60000),
+]
+
+
+@pytest.mark.parametrize(("how", "error", "word", "asked", "low", "high"), BAD)
+def test_a_bad_step_is_refused_and_named(seven, how, error, word, asked, low, high):
+    good = seven.all(8000, after=50)
+    seven.begin(4)
+    bad = seven.all(8000, **how)
+    answer = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for r in (good, good, bad, good) for w in r])
+    assert answer == (error, word, 2, asked, low, high)
+    assert seven.state()["received"] == 0, "none of them was taken"
+
+
+def test_a_target_above_the_limit_is_refused(sequencer):
+    high = sequencer.rig.board.HEIGHT_MAX_UM
+    for um in (high + 1, 0xFFFE):
+        bad = sequencer.all(8000, after=50)
+        bad[4 + 3] = um
+        sequencer.begin(1)
+        refused = sequencer.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in bad])
+        assert refused == (messages.BAD_STEP, 4 + 3, 0, um, 0, high)
+
+
+def test_flags_that_mean_nothing_are_refused(seven):
+    for flags in (3, 0x80, 0x8000, 4 | 1, 0x20):
+        seven.begin(1)
+        bad = [flags, 100, 100, 0, *[8000] * 7]
+        assert seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in bad])[0] in (
+            messages.BAD_STEP,
+            messages.BAD_LOOP,
+        )
+
+
+def test_repeats_that_do_not_fit_are_refused(seven):
+    one = seven.all(8000, after=50)
+    repeat, end = seven.repeat(2), seven.end()
+    for records, where in (([end], 0), ([repeat, end], 1), ([repeat, one, end, end], 3), ([repeat] * 5, 4)):
+        seven.begin(len(records))
+        refused = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for r in records for w in r])
+        assert refused[:3] == (messages.BAD_LOOP, WHOLE, where)
+    seven.upload([repeat, one])
+    assert seven.refusal("SEQUENCE_ARM", 7)[0] == messages.NOT_READY, "one that is not ended"
+
+
+def test_what_is_not_whole_or_not_that_is_not_armed(seven):
+    one = seven.all(8000, after=50)
+    assert seven.refusal("SEQUENCE_ARM", 7) == (messages.NOT_READY, 0, WHOLE, messages.EMPTY, 0, 0)
+    assert seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in one])[0] == messages.NOT_READY
+    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == messages.NOT_READY
+    assert seven.refusal("SEQUENCE_CONTROL", 7, messages.PAUSE)[0] == messages.NOT_READY
+    seven.begin(3, crc=1)
+    seven.write(0, [one, one])
+    assert seven.refusal("SEQUENCE_ARM", 7) == (messages.NOT_READY, 0, WHOLE, messages.LOADING, 2, 3)
+    assert seven.refusal("SEQUENCE_ARM", 8)[0] == messages.NOT_READY, "another one"
+    assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(w,) for w in one]) == (
+        messages.OUT_OF_ORDER,
+        1,
+        WHOLE,
+        3,
+        2,
+        2,
+    )
+    seven.write(2, [one])
+    assert seven.write(2, [one])["received"] == 3, "sent twice because the answer was lost"
+    assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(w,) for w in one])[:2] == (messages.NO_ROOM, 2)
+    assert seven.refusal("SEQUENCE_ARM", 7)[0] == messages.BAD_CRC
+    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == messages.NOT_READY
+    for count in (0, 1, 10, 12, 120):
+        assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(1,)] * count)[0] == messages.WRONG_LENGTH
+
+
+def test_an_upload_cut_half_way_is_forgotten_by_the_next(seven):
+    seven.begin(30)
+    seven.write(0, [seven.repeat(2), seven.all(8000, after=50)])
+    seven.id = 8
+    start = seven.play(seven.all(6000, after=50), seven.all(7000, after=50))
+    seven.until_ended()
+    assert seven.begun() == [start, start + 10]
+    assert {one["sequence"] for one in seven.told} == {8}
+
+
+def test_more_than_the_memory_is_a_stream_and_room_is_told(sequencer):
+    board = sequencer.rig.board
+    ring = sequencer.begin(1)["capacity"]
+    assert ring >= 1000
+    assert ring * 2 * sequencer.size <= board.SEQUENCE_BYTES
+    assert sequencer.begin(ring)["free"] == ring
+    assert sequencer.begin(ring + 1)["free"] == ring
+    assert sequencer.begin(0xFFFFFFFF)["free"] == ring
+    assert sequencer.begin(3)["free"] == 3
+
+
+def test_events_that_find_no_room_are_missed_by_their_number(seven):
+    seven.load(*(seven.all(6000, after=5) for _ in range(60)))
+    seven.start()
+    seven.rig.hands.full = True
+    for _ in range(40):
+        seven.rig.app.tick()
+    seven.rig.hands.full = False
+    seven.until_ended()
+    numbers = [one.sequence for one in seven.told]
+    assert numbers[-1] == 60
+    assert len(numbers) < 61
+    assert seven.told[-1]["event"] == SEQUENCE_ENDED
+    assert [one["record"] for one in seven.told[:-1]] == numbers[:-1], "none is told twice, none out of turn"
+
+
+def test_the_schemas_names_are_the_steps_own():
+    assert codec.BY_NAME["SEQUENCE_WRITE"].fixed_size == 4
+    assert (steps.HEAD, steps.LEAVE) == (4, 0xFFFF)
