@@ -93,13 +93,13 @@ class Bubbles:
         control.aim(self._rows, values, first, self.count)
         self._ramp(ticks)
 
-    def step(self, words, at, from_height):
+    def begin(self, words, at, from_height):
         """Begin a step of a sequence, whose targets (µm) are `words[at:]`; `advance` moves it on."""
         control.aim_on(self._rows, words, at, self.count, from_height, self._board[control.REST_UM])
         self._ramp(_ONE)
 
     def advance(self, share):
-        """Let the setpoints be `share`/32768 of their way at the end of this period. `decide` adds the last one."""
+        """Let the setpoints be `share`/32768 of their way at the end of this period. `step` adds the last one."""
         self._board[control.RAMP_DONE] = share - 1
 
     def unsettled(self, tolerance):

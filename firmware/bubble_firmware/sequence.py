@@ -291,7 +291,7 @@ class Player:
             self._carry_us = span_us % tick_us
         self.unsettled = 0
         self._moving = True
-        self._app.bubbles.step(memory, at + steps.HEAD, self._app.mode != ACTIVE)
+        self._app.bubbles.begin(memory, at + steps.HEAD, self._app.mode != ACTIVE)
 
     def _end_by_timeout(self, tick):
         app = self._app

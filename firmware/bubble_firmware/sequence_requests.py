@@ -22,7 +22,8 @@ class SequenceRequests:
         name = app.board.NAME.encode()
         self._names = array("i", (crc32_word(name, 0, len(name)), 0))
         self._crc = array("i", (0,))
-        session.register(
+        session.capabilities |= messages.CAN_SEQUENCES
+        session.serve(
             {
                 messages.SEQUENCE_BEGIN: self._begin,
                 messages.SEQUENCE_WRITE: self._write,

@@ -83,15 +83,11 @@ class Session(Requests):
                 self._wait = self._period
                 self._telemetry()
 
-    def register(self, requests):
-        """Let others handle more requests: a handler for each id, with the same duties as those here."""
-        self._requests.update(requests)
-
     def send_unasked(self, message_id, sequence, count):
         """Send the message whose fields stand in `_values`; whether there was room."""
-        if self._owed:  # a reply comes first, and stands in the frame
+        if self._owed:  # a reply comes first
             return False
-        return self._app.hands.send(self._frame, self._pack(message_id, sequence, count))
+        return self._app.hands.send(self._frame, self._pack(self._frame, message_id, sequence, count))
 
     def fail(self):
         """Tell the host whose request was being handled that the device failed at it: once, if the link still works."""

@@ -214,8 +214,7 @@ class Sequencer:
     def ask(self, name, *fixed, repeated=()):
         """The answer to a request; events that come with it are kept."""
         rig = self.rig
-        rig._sequence += 1
-        rig.hands.to_device += wire.encode(name, rig._sequence, fixed, repeated)
+        rig.hands.to_device += rig.encode(name, rig.next_sequence(codec.BY_NAME[name].id), fixed, repeated)
         self.listen()
         rig.app.tick()
         return self.listen()

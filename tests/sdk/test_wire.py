@@ -74,7 +74,7 @@ def test_info_health_and_state_are_in_the_units_of_their_names():
     assert info.same_schema
     assert (info.tick, info.height_rest_mm, info.height_max_mm, info.pressure_max_kpa) == (0.005, 5.0, 14.0, 42.0)
     counters = (400, 3, 1000, 1, 17, 2, 5, 123456, 59990, 0xDEADBEEF, messages.HOLDING)
-    board = (messages.WATCHDOG, messages.FAILED, 0b101, 0b10, 0)
+    board = (messages.WATCHDOG, messages.FAILED, 0b101, 0b10, 0, messages.SLOT_B)
     (reply,) = receive(wire.encode("INFO_REPLY", 1, (*counters, *board)))
     assert Health.of(reply, info.tick) == Health(
         time=2.0,
@@ -93,6 +93,7 @@ def test_info_health_and_state_are_in_the_units_of_their_names():
         untrue_zero=(0, 2),
         unfilled=(1,),
         unvented=(),
+        store="slot_b",
     )
     (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 1), [(12345, -34, 12000, 2, 0), (5000, 0, 0, 4, 5)]))
     state = State.of(reply, info.tick)
@@ -116,7 +117,7 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
     state = State.of(reply, 0.005)
     assert (state.mode, state.status, state.faults) == ("unknown", ("unknown",), ((),))
     assert not state.settled
-    (reply,) = receive(wire.encode("INFO_REPLY", 1, (*[0] * 10, 99, 0, 99, 0, 0, 0)))
+    (reply,) = receive(wire.encode("INFO_REPLY", 1, (*[0] * 10, 99, 0, 99, 0, 0, 0, 0)))
     assert (Health.of(reply, 0.005).mode, Health.of(reply, 0.005).self_test) == ("unknown", "unknown")
 
 
