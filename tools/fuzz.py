@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-WATCHED = ["bubble_protocol", *(f"bubble_firmware.{name}" for name in ("session", "requests", "delivery", "table"))]
+WATCHED = ["bubble_protocol", *(f"bubble_firmware.{name}" for name in ("session", "requests", "delivery"))]
 CORPUS = Path(__file__).parent.parent / "tests/firmware/corpus.txt"
 
 
