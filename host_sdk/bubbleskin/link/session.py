@@ -276,8 +276,9 @@ class Link:
         """What the thread that keeps the link alive does between calls; and take the reply to a PING when it comes."""
         now = self.transport.now()
         self.service(now)
-        answered = self._ping not in self._pings
-        drive(self.wait(now + (0.001 if answered else _SLICE), lambda: self._ping not in self._pings))
+        if self._ping in self._pings:
+            drive(self.wait(now + _SLICE, lambda: self._ping not in self._pings))
+        drive(self.wait(now + max(0.001, getattr(self.transport, "behind", 0.0))))
 
     def next_beat(self) -> float:
         """Seconds until `tend` is wanted."""
@@ -315,6 +316,8 @@ class Link:
                 self.telemetry.append(message)
             elif message.id == messages.SEQUENCE_EVENT:
                 self.events.append(message)
+            elif message.id < messages.REPLY and message.id != messages.ERROR:
+                continue  # an echo
             elif what == messages.HELLO:
                 self._greeted(message)
             elif what == messages.PING:

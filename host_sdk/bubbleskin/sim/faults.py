@@ -117,7 +117,7 @@ class FaultLink:
                 continue
             if self._happens("truncate"):
                 whole = whole[: self._random.randrange(len(whole))]
-            if self._happens("flip"):
+            if whole and self._happens("flip"):
                 whole = self._flipped(whole)
             if not self._late[outward] and self._happens("reorder"):
                 self._late[outward] = whole

@@ -45,7 +45,7 @@ class SimulatedTransport:
         self._check()
         board = self.board
         until = board.time + timeout
-        while (not board.from_device and board.time < until) or (self._pace and self._pace.owed() > 0):
+        while not board.from_device and board.time < until:
             if self._pace:
                 self._pace.wait()
             board.tick()
@@ -61,6 +61,11 @@ class SimulatedTransport:
     def now(self) -> float:
         """Virtual seconds since the board's start."""
         return self.board.time
+
+    @property
+    def behind(self) -> float:
+        """Seconds that a board in real time is behind the wall clock, because nobody has read for a while."""
+        return self._pace.owed() if self._pace else 0.0
 
     def close(self) -> None:
         """End the simulation."""

@@ -1,0 +1,144 @@
+"""The SDK's link against the firmware's session, joined in memory by a line that fails: exactly once, or told."""
+
+import contextlib
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+
+import bubbleskin as bs
+from bubble_protocol import messages
+from bubbleskin.link.session import Link, drive
+from bubbleskin.link.window import Request
+from bubbleskin.sim import FaultLink, Faults
+
+TOOLS = Path(__file__).parents[2] / "tools"
+
+
+def tool(name):
+    """A program of `tools/` as a module."""
+    spec = importlib.util.spec_from_file_location(name, TOOLS / f"{name}.py")
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+soak = tool("soak")
+
+
+def test_ten_thousand_commands_over_a_line_that_fails():
+    result = soak.soak(10_000, seed=3)
+    assert result.problems == []
+    assert len(result.journals) > 3
+    assert result.told.count(soak.APPLIED) > 9000
+    assert min(count for fault, count in result.faults.items() if fault != "stall") > 10
+
+
+def test_a_device_that_forgets_replies_would_be_found_out(monkeypatch):
+    """The check can fail: without the replies kept, what comes twice is applied twice."""
+
+    def arrive(self, message_id, sequence):
+        decoder = self._decoder
+        if message_id == messages.HELLO:
+            return self._answer_aside(message_id, sequence)
+        self._delivery.expected = sequence
+        return self._apply(decoder.frame, decoder.length)
+
+    monkeypatch.setattr(soak.firmware_session.Session, "_arrive", arrive)
+    assert any("twice" in problem for problem in soak.soak(300, seed=3).problems)
+
+
+class ExactlyOnce(RuleBasedStateMachine):
+    """Requests are made, time passes, the line fails and the board restarts, in any order.
+
+    The model: every SHOW has a number of its own; the firmware's journal of each boot holds none of them twice and
+    all in order; one that was answered is there, one that was told not to have been applied is not.
+    """
+
+    @initialize(seed=st.integers(0, 1000))
+    def begin(self, seed):
+        self.device = soak.Device()
+        faults = Faults(drop=0.2, duplicate=0.1, flip=0.05, reorder=0.1, truncate=0.05, split=0.1)
+        self.line = FaultLink(self.device, faults, seed=seed)
+        self.line.on = False
+        self.link = Link(self.line, 1.0)
+        drive(self.link.hello())
+        self.requests = []
+
+    @rule(count=st.integers(1, 12))
+    def show(self, count):
+        """Requests are made, and nobody waits for them yet."""
+        for _ in range(count):
+            number = len(self.requests)
+            heights = [(number // soak.BASE,), (number % soak.BASE,), *[(6000,)] * 5]
+            request = Request("SHOW", (0,), heights, self.device.now() + 1.0, 1.0)
+            self.link._window.submit(request)
+            self.requests.append(request)
+
+    @rule(name=st.sampled_from(["STOP", "VENT"]))
+    def urgent(self, name):
+        self.link._window.submit(Request(name, (), (), self.device.now() + 1.0, 1.0))
+
+    @rule()
+    def call(self):
+        with contextlib.suppress(bs.LinkError, bs.Overtaken):
+            drive(self.link.call("STATE"))
+
+    @rule(seconds=st.sampled_from([0.005, 0.02, 0.1, 0.5, 1.5]))
+    def wait(self, seconds):
+        drive(self.link.wait(self.device.now() + seconds))
+
+    @rule(on=st.booleans())
+    def fail(self, on):
+        self.line.on = on
+
+    @rule()
+    def restart(self):
+        self.device.reset()
+
+    @rule()
+    def another_session(self):
+        try:
+            drive(self.link.hello())
+        except bs.WrongDevice:
+            assert self.line.on, "nothing but the line can be in the way"
+
+    @invariant()
+    def exactly_once(self):
+        if not hasattr(self, "device"):
+            return
+        journals = [list(journal) for journal in self.device.journals]
+        for journal in journals:
+            assert journal == sorted(set(journal))
+        applied = [number for journal in journals for number in journal]
+        assert len(set(applied)) == len(applied)
+        for number, request in enumerate(self.requests):
+            if request.reply and request.reply.id != messages.ERROR:
+                assert number in applied
+            elif request.done and not getattr(request.error, "outcome_unknown", False):
+                assert number not in applied
+
+    def teardown(self):
+        """In the end the line is good, and everything is decided."""
+        if not hasattr(self, "device"):
+            return
+        self.line.on = False
+        for _ in range(3):
+            self.call()
+        drive(self.link.wait(self.device.now() + 2.0))
+        assert all(request.done for request in self.requests if request.sends)
+        drive(self.link.call("STATE"))
+        self.exactly_once()
+
+
+TestExactlyOnce = ExactlyOnce.TestCase
+TestExactlyOnce.settings = settings(max_examples=25, stateful_step_count=25, deadline=None)
+
+
+@pytest.mark.slow
+class TestExactlyOnceAtLength(ExactlyOnce.TestCase):
+    settings = settings(max_examples=400, stateful_step_count=50, deadline=None)
