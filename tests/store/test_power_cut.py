@@ -122,7 +122,9 @@ def cut_everywhere(kit, flash, data, commit, program, erase):
             last = again.change(999)
             assert again.store.save()
             assert kit.Device(torn, data).content == last
-    print(f"{len(whole.kinds)} operations, {sum(count.values())} cuts: {count['old']} left old, {count['new']} left new")
+    print(
+        f"{len(whole.kinds)} operations, {sum(count.values())} cuts: {count['old']} left old, {count['new']} left new"
+    )
     return count
 
 
