@@ -63,7 +63,7 @@ class Store:
         self.length = 0
         self.wear = array("i", (0, 0))
         self.tables_crc = 0
-        self.error = 0
+        self.error = 0 if flash else STORE_FAILED
         self.source = NO_STORE
         if flash:
             try:
@@ -87,8 +87,8 @@ class Store:
     def reset(self):
         """Use the defaults again and store in both slots that it is so. False, with `error`, where the flash fails."""
         if not self._flash:
-            self.error = STORE_FAILED
             return False
+        self.error = 0
         for _ in range(2):
             self._look_at_both()
             if not self._commit(self._kept(), HEADER):
@@ -101,7 +101,7 @@ class Store:
     def _ready(self):
         """Whether there is a store that may be written."""
         self.error = 0
-        if not self._flash or self.capacity < len(self._record):
+        if self.capacity < len(self._record):
             self.error = STORE_FAILED
         else:
             self._look_at_both()

@@ -29,13 +29,11 @@ class StoreRequests:
 
     def _save(self, count):
         if self._vented():
-            self._pause()
-            self._answer(self._app.store.save())
+            self._answer(self._pause() and self._app.store.save())
 
     def _reset(self, count):
         if self._vented():
-            self._pause()
-            self._answer(self._app.store.reset())
+            self._answer(self._pause() and self._app.store.reset())
 
     def _info(self, count):
         self._answer(True)
@@ -71,11 +69,14 @@ class StoreRequests:
         return False
 
     def _pause(self):
-        """Bring all outputs to where they may stay for as long as flash takes."""
+        """Bring all outputs to where they may stay for as long as flash takes; False where there is no flash."""
         app = self._app
+        if not app.store.capacity:
+            return False
         app.self_test.skip()
-        app.hands.vent()
+        app.hands.vent()  # the pump, too
         app.hands.slack()
+        return True
 
     def _answer(self, done):
         store = self._app.store

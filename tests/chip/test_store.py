@@ -31,8 +31,8 @@ def test_saved_tables_outlive_the_watchdog(emulated, name):
     full = skin.save()  # tables of 64 knots
     assert (full.source, full.generation, full.slots, full.wear) == ("slot_a", 1, ("whole", "blank"), (1, 0))
     assert bytes(flash[STORE_AT : STORE_AT + 4]) == b"bsst"
-    before = skin.health()
     skin.upload_tables(TABLE)
+    before = skin.health()
     info = skin.save()
     assert (info.source, info.generation, info.slots, info.wear) == ("slot_b", 2, ("whole", "whole"), (1, 1))
     after = skin.health()

@@ -92,10 +92,9 @@ class Hands:
             self._running = True
             pwm.wrapped(_PWM)
         left = self._tick_us - pwm.phase(_PWM)
-        if pwm.wrapped(_PWM):
-            if not self._slack:
-                self.late_ticks += 1
-        else:
+        if pwm.wrapped(_PWM) and not self._slack:
+            self.late_ticks += 1
+        else:  # after slack, too: what begins in the middle of a period is late for the next one
             if left > _MS_US + 200:
                 time.sleep_ms((left - 200) // _MS_US)
             while not pwm.wrapped(_PWM):
