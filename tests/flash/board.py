@@ -9,7 +9,7 @@ import sys
 
 import vfs
 
-BLOCK, BLOCKS = 4096, 48
+BLOCK, BLOCKS = 4096, 96
 
 
 class Flash:

@@ -15,7 +15,7 @@ from bubbleskin.flash import slots, starter
 from bubbleskin.flash.prompt import Prompt
 from bubbleskin.interpreter import find_micropython
 
-BLANK = b"\xff" * (48 * 4096)
+BLANK = b"\xff" * (96 * 4096)
 STORED = {"/store-a": b"calibration" * 9, "/notes.txt": b"the user's own"}
 
 
@@ -121,6 +121,7 @@ def firmware(who: str, folder: Path, start: str = "import bubble_firmware; raise
     sources = {
         "bubble_firmware/__init__": f"WHO = {who!r}",
         "bubble_firmware/boards/one": "X = 1\n" * 700,
+        **{f"bubble_firmware/drivers/{n}": f"{who}{n} = {n}\n" * (99 * n) for n in range(2, 7)},
         "start": start,
     }
     for name, source in sources.items():
@@ -173,7 +174,7 @@ def cut_everywhere(bench: Bench, image: bytes, files: dict[str, bytes], before: 
     bench.changes.clear()
     bench.update(files)
     every = list(dict.fromkeys(states(image, bench.changes)))
-    assert len(every) > 100
+    assert len(every) > 60
     seen = set()
     for number, state in enumerate(every):
         runs = bench.runs(state)
@@ -234,9 +235,9 @@ def test_the_same_firmware_again_writes_nothing(flashed, tmp_path):
 
 def test_a_full_board_is_told_from_before(flashed, tmp_path):
     flashed.plug_in()
-    files = {"large.mpy": bytes(190 << 10), **firmware("new", tmp_path)}
+    files = {"large.mpy": bytes(390 << 10), **firmware("new", tmp_path)}
     with pytest.raises(
-        BubbleskinError, match=r"has \d+ KiB free, and the firmware needs 2\d\d.*nothing has been changed"
+        BubbleskinError, match=r"has \d+ KiB free, and the firmware needs 4\d\d.*nothing has been changed"
     ):
         flashed.update(files)
     flashed.pull_out()
