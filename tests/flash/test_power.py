@@ -175,6 +175,9 @@ def cut_everywhere(bench: Bench, image: bytes, files: dict[str, bytes], before: 
     bench.update(files)
     every = list(dict.fromkeys(states(image, bench.changes)))
     assert len(every) > 60
+    print(f"{len(every)} states")
+    step = int(os.environ.get("BUBBLESKIN_CUT_STEP", "1"))  # more than 1: some of them, on a busy machine
+    every = [*every[:-1:step], every[-1]]
     seen = set()
     for number, state in enumerate(every):
         runs = bench.runs(state)
