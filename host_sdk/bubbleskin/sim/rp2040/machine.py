@@ -36,6 +36,7 @@ class EmulatedMachine:
         self.written: Callable[[int], bool] = lambda blocks: True  # whether power stays on after so many
         self.on_chip: Callable[[Chip], None] = lambda chip: None  # called with every chip that gets power
         self._passed = 0.0
+        self._starts = 0
 
     # ---- hands of the person at the table
 
@@ -45,6 +46,8 @@ class EmulatedMachine:
             self._show_drive()
             return
         chip = self.chip = Chip(None, self.flash)
+        self._starts += 1  # the emulator's random numbers are the same at every start; the firmware adds this one
+        chip.mcu.watchdog.scratch_data[0] = self._starts << 8
         data = load_board("wristband7")
         SpiBus(chip, 0).add(Mcp3208(lambda channel: data.SENSOR_ZERO), data.CONVERTERS[0][0])
         chip.mcu.gpio[data.PIN_ESTOP].set_input_value(False)
