@@ -37,6 +37,8 @@ if TYPE_CHECKING:
         read_csv,
     )
     from bubbleskin.shape.contact import CompliantContact, Shape
+    from bubbleskin.shape.fit import ContactFit, Measured, fit_contact
+    from bubbleskin.shape.plan import Plan, plan
     from bubbleskin.shape.rigid import RigidContact
 
 # The physics takes scipy, which takes a second to import, and contact takes numba; a script that only shows heights
@@ -44,14 +46,19 @@ if TYPE_CHECKING:
 _LATER = {
     "Calibration": "physics",
     "CompliantContact": "shape.contact",
+    "ContactFit": "shape.fit",
+    "Measured": "shape.fit",
+    "Plan": "shape.plan",
     "RigidContact": "shape.rigid",
     "Shape": "shape.contact",
     "Table": "physics",
     "YeohBalloon": "physics",
     "YeohFit": "physics",
     "build_table": "physics",
+    "fit_contact": "shape.fit",
     "fit_sheet": "physics",
     "fit_yeoh": "physics",
+    "plan": "shape.plan",
     "preset": "physics",
     "read_csv": "physics",
 }
@@ -62,6 +69,7 @@ __all__ = [
     "BubbleskinError",
     "Calibration",
     "CompliantContact",
+    "ContactFit",
     "DeviceFault",
     "DeviceRefused",
     "DeviceRestarted",
@@ -72,8 +80,10 @@ __all__ = [
     "InvalidInput",
     "Layout",
     "LinkError",
+    "Measured",
     "NoEquilibrium",
     "Overtaken",
+    "Plan",
     "Played",
     "Playing",
     "Repeat",
@@ -92,8 +102,10 @@ __all__ = [
     "aconnect",
     "build_table",
     "connect",
+    "fit_contact",
     "fit_sheet",
     "fit_yeoh",
+    "plan",
     "preset",
     "read_csv",
     "sequences",

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from bubbleskin.cli import bench, device, firmware, flash, membrane, play, plot, sim, store
+from bubbleskin.cli import bench, device, firmware, flash, membrane, plan, play, plot, sim, store
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 
@@ -18,6 +18,7 @@ def bubbleskin() -> None:
 for _command in (
     *device.commands,
     *play.commands,
+    *plan.commands,
     *store.commands,
     *sim.commands,
     *membrane.commands,

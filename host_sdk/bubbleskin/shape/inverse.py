@@ -28,7 +28,7 @@ _COARSE = 4  # increments of a correction, which is short
 def correct(model: CompliantContact, shape: Shape, heights_mm: Array, highest: Array) -> Shape:
     """Change the pressures of `shape`, in [0, `highest`], until its heights are `heights_mm` or as near as they get.
 
-    Least squares where they cannot all be met. It keeps to the branch that `shape` is on.
+    Least squares where they cannot all be met. It keeps to the branch that `shape` is on as long as that leads nearer.
     """
     for _ in range(_TURNS):
         error = heights_mm - shape.height_mm
@@ -51,16 +51,19 @@ def correct(model: CompliantContact, shape: Shape, heights_mm: Array, highest: A
 
 
 def _nearer(model: CompliantContact, shape: Shape, heights_mm: Array, change: Array, highest: Array) -> Shape | None:
-    """`shape` after as much of `change` as keeps to its branch and comes nearer; None if nothing does."""
+    """`shape` after as much of `change` as keeps to its branch and comes nearer, or else snaps nearer; None if nothing does."""
+    snapped = None
     error = float(((heights_mm - shape.height_mm) ** 2).sum())
     for share in (1.0, 0.4, 0.15, 0.05):
         pressure = np.clip(shape.pressure + share * change, 0.0, highest)
         if np.abs(pressure - shape.pressure).max() < 0.1:
-            return None
+            break
         trial = model.settle([pressure], start=shape, increments=_COARSE)
-        if trial.converged and not trial.snaps and float(((heights_mm - trial.height_mm) ** 2).sum()) < error:
-            return trial
-    return None
+        if trial.converged and float(((heights_mm - trial.height_mm) ** 2).sum()) < error:
+            if not trial.snaps:
+                return trial
+            snapped = snapped or trial
+    return snapped
 
 
 def steps_of(order: Order, pressure: Array, begin: Array) -> Array:

@@ -25,7 +25,8 @@ LIMIT_MM = 14.0
 TOLERANCE_MM = 0.2
 """A bubble within it has the height asked for."""
 _SCREEN = 8  # increments per step while many orders are tried
-_FIRST, _BRANCHES, _TWOS, _THREES = 3, 100, 160, 200  # orders tried at most
+_FIRST, _BRANCHES, _TWOS, _THREES = 3, 60, 160, 200  # orders tried at most
+_CORRECTED = 8  # of those, branches whose pressures are sought
 _LIFTED_MM = 0.3
 
 
@@ -173,7 +174,7 @@ class _Search:
         seen = {tuple(self.first.lifted_mm > _LIFTED_MM)}
         wrong = np.flatnonzero(np.abs(self.asked - self.first.height_mm) > self.tolerance).tolist()
         for order in islice(pairs(self.first, self.guess, self.model.layout.neighbours, wrong), _BRANCHES):
-            if self.target is not None:
+            if self.target is not None or len(seen) > _CORRECTED:
                 return
             end = self._follow(steps_of(order, self.guess, self.begin), _SCREEN)
             branch = tuple(end.lifted_mm > _LIFTED_MM)
