@@ -21,6 +21,7 @@ _REASONS = {number: name for number, name, _ in messages.SEQUENCE_REASONS}
 _WORDS_PER_MESSAGE = 121
 _POLL = 0.5
 """Seconds without news after which the device is asked."""
+_NAMED = 3  # heights in a sentence
 _TOP_UP = 0.05
 """Seconds between two looks at whether a stream's memory has room."""
 
@@ -235,8 +236,8 @@ class _Told:
         limit = f" within {until.timeout_s:g} s" if isinstance(until, Settled) else ""
         where = ""
         if state:
-            off = (f"{state.height_mm[b]:.2f} instead of {state.target_mm[b]:.2f} mm" for b in unsettled)
-            where = f" at {', '.join(off)}"
+            off = [f"{state.height_mm[b]:.2f} instead of {state.target_mm[b]:.2f} mm" for b in unsettled[:_NAMED]]
+            where = f" at {', '.join(off)}{' …' * (len(unsettled) > _NAMED)}"
         return f"{self.feed.sequence.say(step)} did not settle{limit}: {self._layout.names(unsettled)}{where}."
 
 

@@ -162,3 +162,57 @@ def test_tables_go_to_the_wristband_and_come_back(run, tmp_path):
     wrong = run("table", "--board", "wristband19", "--bubbles", "19", "-o", mixed, "--upload", *SIM)
     assert wrong[0] == 2
     assert "this is a wristband7" in wrong[2]
+
+
+# Sequences.
+
+
+def test_play_says_what_it_played(run):
+    code, out, err = run("play", "pulse", "--loops", "1", *SIM)
+    assert code == 0, err
+    assert "Played pulse: 8 steps in 3.900 s" in out
+
+
+def test_play_takes_files_and_prints_json(run, tmp_path):
+    path = tmp_path / "line.csv"
+    path.write_text("time_s,b0,b1,b2,b3,b4,b5,b6\n0,6,6,6,6,6,6,6\n0.5,9,9,9,9,9,9,9\n", encoding="utf-8")
+    code, out, err = run("play", str(path), "--json", "--loops", "2", *SIM)
+    assert code == 0, err
+    played = json.loads(out)
+    assert played["steps"] == [0, 1, 0, 1]
+    assert played["ended"] - played["began"][0] == pytest.approx(2.0)
+    assert played["timeouts"] == []
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        (["nothing"], ["'nothing'", "pulse", "flat-twin"]),
+        (["nowhere.json"], ["nowhere.json", "Cannot read"]),
+        (["pulse", "--loops", "-1"], ["plays -1 times"]),
+        (["pulse", "--at", "nan"], ["cannot start at nan"]),
+    ],
+)
+def test_what_cannot_be_played_is_one_sentence(run, what, words):
+    assert_one_sentence(run("play", *what, *SIM), 2, *words)
+
+
+def test_a_start_that_has_passed_is_the_devices_refusal(run):
+    assert_one_sentence(run("play", "pulse", "--at", "0.01", *SIM), 1, "has passed")
+
+
+def test_ctrl_c_stops_and_vents(run, monkeypatch):
+    skins = []
+
+    def interrupted(skin, *arguments, **named):
+        skins.append(skin)
+        skin.show([9.0] * 7)
+        raise KeyboardInterrupt
+
+    done = []
+    monkeypatch.setattr("bubbleskin.skin.Skin.play", interrupted)
+    monkeypatch.setattr("bubbleskin.skin.Skin.stop", lambda skin: done.append("stop"))
+    monkeypatch.setattr("bubbleskin.skin.Skin.vent", lambda skin: done.append("vent"))
+    code, _, err = run("play", "pulse", *SIM)
+    assert (code, err.strip()) == (130, "Stopped.")
+    assert done == ["stop", "vent"]

@@ -10,7 +10,7 @@ import pytest
 
 from bubble_firmware import boards
 from bubble_firmware.nominal import KNOTS
-from bubble_protocol import messages
+from bubble_protocol import messages, steps
 from bubbleskin.link import wire
 from bubbleskin.sim import SimulatedBoard
 from bubbleskin.sim.board import InProcessFirmware
@@ -190,3 +190,52 @@ def test_what_no_plant_would_do_is_computed_the_same(seed):
     heard = list(wire.Reader(KEY).feed(b"".join(outputs.link for outputs in decided)))
     assert not [message for message in heard if message.id == messages.ERROR]
     assert len({tuple(outputs.pulses) for outputs in decided}) > 100
+
+
+def sequence(n):
+    """What the host sends for every kind of record: ramps of every easing, conditions that come and that do not, repeats."""
+    chance = random.Random(5)
+    blank = [0] * (n + 2)
+
+    def record(easing, until, ramp, wait, tolerance, then=steps.GO_ON):
+        targets = [steps.LEAVE if chance.random() < 0.2 else chance.randrange(4000, 14000) for _ in range(n)]
+        return [steps.flags(easing, until, then), ramp, wait, tolerance, *targets]
+
+    records = [record(easing, steps.TIME, 173, 31, 0) for easing in range(4)]
+    records += [[steps.REPEAT, 3, *blank], *records[:2], [steps.END, 0, *blank]]
+    records += [
+        record(1, steps.SETTLE, 90, 3000, 300),
+        record(2, steps.SETTLE, 0, 70, 60),
+        record(0, steps.TIME, 333, 0, 0),
+    ]
+    records += [record(3, steps.SETTLE, 77, 50, 50, steps.VENT)]
+    words = [word for record in records for word in record]
+    crc = zlib.crc32(np.array(words, "<u2").tobytes())
+    yield wire.encode("SEQUENCE_BEGIN", 1, (0xFFFF, n, 0, len(records), crc))
+    for first in range(0, len(records), 5):
+        part = [(word,) for record in records[first : first + 5] for word in record]
+        yield wire.encode("SEQUENCE_WRITE", 2 + first, (0xFFFF, first), part)
+    yield wire.encode("SEQUENCE_ARM", 40, (0xFFFF,))
+    yield wire.encode("SEQUENCE_START", 41, (0xFFFF, 50))
+    yield from [b""] * 150
+    yield wire.encode("SEQUENCE_CONTROL", 42, (0xFFFF, messages.PAUSE))
+    yield from [b""] * 30
+    yield wire.encode("SEQUENCE_CONTROL", 43, (0xFFFF, messages.RESUME)) + wire.encode("SEQUENCE_STATE", 44)
+
+
+@pytest.mark.usefixtures("micropython")
+@pytest.mark.parametrize("name", ["wristband7", "wristband19"])
+def test_a_sequence_is_played_the_same(name):
+    board = SimulatedBoard(name, seed=BOOT_ID - 1)
+    board.firmware = recorder = Recorder(board.firmware)
+    requests = sequence(board.data.BUBBLES)
+    for _ in range(1200):
+        board.to_device += next(requests, b"")
+        board.tick()
+    assert_same(recorder.decided, replay(MicroPythonFirmware(board.data, BOOT_ID), recorder.given))
+    heard = list(wire.Reader().feed(b"".join(outputs.link for outputs in recorder.decided)))
+    assert not [message for message in heard if message.id == messages.ERROR]
+    events = [message for message in heard if message.id == messages.SEQUENCE_EVENT]
+    assert {event["reason"] for event in events} == {0, messages.BY_TIME, messages.BY_SETTLING, messages.BY_TIMEOUT}
+    assert events[-1]["event"] == messages.SEQUENCE_ENDED
+    assert len(events) == 4 + 6 + 4 + 2 + 1

@@ -40,7 +40,7 @@ def play(what: str, loops: int | None, at: float | None, device: str | None, jso
             TimeElapsedColumn(),
         )
         try:
-            with Progress(*columns, console=console, transient=True, disable=json) as bar:
+            with Progress(*columns, console=console, transient=True, disable=json or not console.is_terminal) as bar:
                 task = bar.add_task(f"{sequence.name or what} …", total=None, step="upload")
 
                 def report(playing: Playing) -> None:
