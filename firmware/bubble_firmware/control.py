@@ -232,10 +232,11 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                         trust = TRUST_MAX
                     far = s[HEIGHT + SLOPE] * SURPRISE_UM >> 8
                     q = ptr32(uint(curves) + seg)
-                    if (far - off | far + off) >> 31:
-                        if mean - s[HEIGHT + MODEL] > SURPRISE_PA or mean - s[HEIGHT + MODEL] < 0 - SURPRISE_PA:
-                            trust = 1
-                            weight = 1
+                    if (far - off | far + off) >> 31 and (
+                        mean - s[HEIGHT + MODEL] > SURPRISE_PA or mean - s[HEIGHT + MODEL] < 0 - SURPRISE_PA
+                    ):
+                        trust = 1
+                        weight = 1
                     s[TRUST] = trust
                     air += (off * weight + (trust >> 1)) // trust  # rounded: a bias would add up over so many
                 else:  # the vent is open: nothing is counted, the sensor alone says what there is
@@ -392,9 +393,8 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                         s[COAST] = 1
                     if width > tick - shortest:  # too short a gap to close in
                         width = tick if width > tick - (shortest >> 1) else tick - shortest
-                    elif width < shortest:
-                        if opened == 0:  # of open time, half of the shortest or more is worth a pulse
-                            width = shortest if 2 * (width - delay) >= shortest - delay else 0
+                    elif opened == 0 and width < shortest:  # of open time, half of that or more is worth a pulse
+                        width = shortest if 2 * (width - delay) >= shortest - delay else 0
                     if width < tick:
                         # Only while not saturated: the integral must not wind up.
                         if integral > INTEGRAL_MAX:

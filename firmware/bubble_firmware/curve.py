@@ -3,7 +3,7 @@
 
 A *curve* is a table's knots with more said at each, `control` names the places: height, air, pressure, and for the
 segment that begins there air per height, its reciprocal and pressure per air. Air is linear in height between two
-knots; a segment longer than 1 mm is divided, so that this costs less than 20 µm. Air always rises, by at least
+knots; a segment longer than 1 mm is divided, so that this costs less than 35 µm. Air always rises, by at least
 1 µJ/µm, whatever the table.
 
 *Roots* are what a restrictor's flow is proportional to (ISO 6358, below the critical ratio b):

@@ -134,7 +134,7 @@ def test_a_curve_says_of_the_table_what_a_sphere_holds(name):
     slope = np.diff(knots[:, control.A]) / np.diff(h)
     off = np.abs(np.interp(heights, h, knots[:, control.A]) - exact) / slope[np.searchsorted(h, heights, "right") - 1]
     print(f"{name}: air within {off.max():.1f} µm of height")
-    assert off.max() < (20 if name == "sparse" else 6)
+    assert off.max() < (35 if name == "sparse" else 6)
     assert knots[:-1, control.S] == pytest.approx(256 * slope, rel=1e-3)
     assert knots[:-1, control.R] == pytest.approx(2**28 / knots[:-1, control.S], abs=1)
     rise = 4096 * np.diff(knots[:, control.P]) / np.diff(knots[:, control.A])
@@ -161,9 +161,11 @@ def test_pressure_is_read_back_as_the_tables_height(name):
         for _ in range(9):
             bubbles.step(counts, 60000, messages.VENTED)
         pressure = step * BOARD.SENSOR_PA_PER_COUNT
-        assert bubbles._rows[control.HEIGHT] / 16 == pytest.approx(
-            np.interp(pressure, made.pressure_pa, made.height_um), abs=8 if name == "sparse" else 4
-        ) or name == "soft"
+        assert (
+            bubbles._rows[control.HEIGHT] / 16
+            == pytest.approx(np.interp(pressure, made.pressure_pa, made.height_um), abs=8 if name == "sparse" else 4)
+            or name == "soft"
+        )
         assert bubbles._rows[control.HEIGHT + control.MODEL] == pytest.approx(pressure, abs=40)
 
 

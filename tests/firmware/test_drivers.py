@@ -234,7 +234,7 @@ def test_what_has_not_changed_is_only_sent_again_when_asked(expander):
 
 @pytest.mark.parametrize("bubbles", [(7,), (9, 12), (7, 8, 12)])
 def test_what_has_changed_is_sent_and_nothing_else(expander, bubbles):
-    chip, bus, driver = expander
+    chip, _, driver = expander
     pulses = array("H", [1500] * 38)
     driver.write(pulses, False)
     sent = bytearray(chip.registers)

@@ -221,6 +221,7 @@ class ExpanderValves:
             self._chips.append(pca9685.Pca9685(bus, address, first, bubbles, board.TICK_US))
             first += bubbles
         self._turn = 0
+        self._ticks = 0
         Pin(board.PIN_CLOCK, Pin.ALT, alt=Pin.ALT_GPCK)
 
     def connect(self):
@@ -247,10 +248,12 @@ class ExpanderValves:
             turn = 0
         self._turn = turn
         chips[turn].check()
+        self._ticks += 1
+        again = not self._ticks & 3
         silent = False
         for index in range(len(chips)):
             chip = chips[index]
-            chip.write(pulses, index == turn)
+            chip.write(pulses, index == turn and again)
             if chip.missing:
                 silent = True
         self.silent = silent

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """The law of `bubble_firmware.control.step` once more, in ordinary floats: what `bubbleskin bench` holds it against.
 
 It runs on CPython and, sent to the prompt of an emulated chip, as MicroPython's bytecode. The same readings give
@@ -233,10 +234,8 @@ class Bubbles:
         share = self.done / self.ticks
         same = mode == self.mode
         self.mode = mode
-        i = 0
-        for bubble in self.bubbles:
+        for i, bubble in enumerate(self.bubbles):
             bubble.step(counts[i], supply, mode == 1, same, share)
-            i += 1
 
     def pulses(self):
         """Fill and vent µs of every bubble."""
