@@ -20,7 +20,10 @@ class Bubbles:
         self.count = n
         self.pulses = array("H", bytearray(4 * n))
         curves = control.ROWS + control.ROW * n
-        state = array("i", bytearray(4 * (curves + control.KNOT * curve.KNOTS_MAX * n)))
+        # Made of a range, an array comes into being once; of a bytearray, twice, and there is no room for that.
+        state = array("i", range(curves + control.KNOT * curve.KNOTS_MAX * n))
+        for index in range(curves):
+            state[index] = 0
         view = memoryview(state)
         self._board = state
         self._rows = view[control.ROWS : curves]

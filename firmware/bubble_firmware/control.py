@@ -52,7 +52,7 @@ HEIGHT = const(24)  # in 1/16 µm, so that averages do not stall on whole ones
 SETPOINT = const(28)  # in 1/16 µm
 SEGMENT = const(1)  # where its segment of the curve begins, bytes
 SLOPE = const(2)  # air per height in that segment, µJ/µm, *256
-MODEL = const(3)  # of the estimate: the pressure that belongs to it, Pa
+MODEL = const(3)  # of the estimate: the pressure that belonged to it when it was last measured, Pa
 CONTENT = const(3)  # of the setpoint: its air, µJ
 START = const(32)  # where the ramp to the target began, µm
 RAMPING = const(33)  # whether the setpoint is not at its target yet
@@ -71,8 +71,7 @@ A = const(1)  # air, µJ
 P = const(2)  # pressure, Pa
 S = const(3)  # air per height from here on, µJ/µm, *256
 R = const(4)  # its reciprocal, 2^28/S
-D = const(5)  # pressure per air, Pa/µJ, *4096
-KNOT = const(6)
+KNOT = const(5)
 
 # The board's numbers.
 N = const(0)
@@ -232,6 +231,12 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                         trust = TRUST_MAX
                     far = s[HEIGHT + SLOPE] * SURPRISE_UM >> 8
                     q = ptr32(uint(curves) + seg)
+                    rise = air - q[A]  # the pressure that the estimate means, within its segment of the tick before
+                    if rise < 0:
+                        rise = 0
+                    if rise > q[KNOT + A] - q[A]:
+                        rise = q[KNOT + A] - q[A]
+                    s[HEIGHT + MODEL] = q[P] + (((rise << 12) // (q[KNOT + A] - q[A])) * (q[KNOT + P] - q[P]) >> 12)
                     if (far - off | far + off) >> 31 and (
                         mean - s[HEIGHT + MODEL] > SURPRISE_PA or mean - s[HEIGHT + MODEL] < 0 - SURPRISE_PA
                     ):
@@ -267,7 +272,6 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
             s[HEIGHT] = height
             s[HEIGHT + SEGMENT] = seg
             s[HEIGHT + SLOPE] = q[S]
-            s[HEIGHT + MODEL] = q[P] + (off * q[D] >> 12)
 
             # The air of the setpoint.
             if s[RAMPING]:

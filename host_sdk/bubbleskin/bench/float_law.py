@@ -111,6 +111,11 @@ class Bubble:
                 air += off
             else:
                 self.trust = min(self.trust + weight, 64)
+                seg = self.seg
+                part = (air - curve.air[seg]) / (curve.air[seg + 1] - curve.air[seg])
+                self.model = curve.pressure[seg] + min(max(part, 0.0), 1.0) * (
+                    curve.pressure[seg + 1] - curve.pressure[seg]
+                )
                 if abs(off) > 500 * self.slope and abs(mean - self.model) > 500:
                     self.trust = weight = 1
                 air += off * weight / self.trust
@@ -119,7 +124,6 @@ class Bubble:
         self.seg, part = curve.within(curve.air, air, self.seg)
         seg = self.seg
         self.height = curve.height[seg] + part * (curve.height[seg + 1] - curve.height[seg])
-        self.model = curve.pressure[seg] + part * (curve.pressure[seg + 1] - curve.pressure[seg])
         self.slope = (curve.air[seg + 1] - curve.air[seg]) / (curve.height[seg + 1] - curve.height[seg])
         if self.ramping:
             self.ramping = share < 1
