@@ -21,6 +21,7 @@
     flash                       where the store is, see `store`; None where there is none
 """
 
+import gc
 from array import array
 
 from bubble_firmware.bubbles import Bubbles
@@ -43,6 +44,7 @@ class App:
     """The firmware of one board. Call `tick` once per period; it catches everything and allocates nothing."""
 
     def __init__(self, board, hands):
+        gc.collect()  # or what imports have left behind splits the heap where the bubbles' state is to go in one piece
         self.board = board
         self.hands = hands
         self.ticks = 0

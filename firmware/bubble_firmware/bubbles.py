@@ -23,7 +23,10 @@ class Bubbles:
         self.count = n
         self.pulses = array("H", bytearray(4 * n))
         curves = control.ROWS + control.ROW * n
-        state = array("i", bytearray(4 * (curves + control.KNOT * curve.KNOTS_MAX * n)))
+        # Made of a range, an array comes into being once; of a bytearray, twice, and there is no room for that.
+        state = array("i", range(curves + control.KNOT * curve.KNOTS_MAX * n))
+        for index in range(curves):
+            state[index] = 0
         view = memoryview(state)
         self._board = state
         self._rows = view[control.ROWS : curves]
@@ -48,6 +51,7 @@ class Bubbles:
         k[control.DEADBAND_UM] = board.DEADBAND_UM
         k[control.SETTLED_UM] = board.SETTLED_UM
         k[control.RAMP_DONE] = k[control.RAMP_TICKS] = 1
+        k[control.RAMP_SHARE] = 4096
         for index, root in enumerate(curve.roots(board.CRITICAL_RATIO)):
             k[control.ROOTS + index] = root
         row = self._rows
@@ -63,9 +67,9 @@ class Bubbles:
         for at in range(0, n * control.ROW, control.ROW):
             row[at + control.AIR] = self._curves[row[at + control.FIRST] // 4 + control.A]
 
-        # Defaults are locals: an attribute costs the chip 2.5 µs.
-        def step(counts, supply_pa, mode, step=control.step, rows=row, state=state, pulses=self.pulses):
-            step(rows, state, counts, pulses, supply_pa, mode)
+        # A default is a local: an attribute costs the chip 2.5 µs. More than 11 locals and values, and a call allocates.
+        def step(counts, supply_pa, mode, work=(control.step, row, state, self.pulses)):
+            work[0](work[1], work[2], counts, work[3], supply_pa, mode)
 
         self.step = step
 
@@ -83,10 +87,8 @@ class Bubbles:
             row[at + control.LAST] = 4 * (first + control.KNOT * (size - 2))
             row[at + control.LOWEST], row[at + control.HIGHEST] = self._tables.pressures(i)
             row[at + control.HEIGHT + control.SEGMENT] = row[at + control.SETPOINT + control.SEGMENT] = 4 * first
-            row[at + control.CALM] = 0
-        k = self._board
-        if k[control.RAMP_DONE] == k[control.RAMP_TICKS]:  # the setpoints' air is to be found again
-            k[control.RAMP_DONE] -= 1
+            row[at + control.CALM] = row[at + control.COAST] = 0
+            row[at + control.RAMPING] = 1  # the setpoint's air is to be found again
 
     def show(self, values, first, ticks):
         """Ramp every bubble from where it is to the height (µm) in `values[first:]` within `ticks` ticks."""

@@ -11,7 +11,8 @@ Height is a single valued function of air even where pressure hardly changes wit
   it turns air into open time by the valve's flow and adds the dead times.
 
 A bubble where nothing is under way is *calm*: it is guarded in every tick, but measured and decided upon in every
-fourth only, by the mean of four readings. Whatever asks something else of a bubble takes its calm away.
+fourth only, by the mean of four readings. Whatever asks something else of a bubble takes its calm away. A bubble
+whose valve stays open for three more periods *coasts* through every second tick.
 
 A command computed in one tick acts from the start of the next: the PWM hardware latches it there. All state is
 one array of 32-bit integers, a row per bubble; the functions are viper on the device and ordinary Python
@@ -52,16 +53,18 @@ HEIGHT = const(24)  # in 1/16 µm, so that averages do not stall on whole ones
 SETPOINT = const(28)  # in 1/16 µm
 SEGMENT = const(1)  # where its segment of the curve begins, bytes
 SLOPE = const(2)  # air per height in that segment, µJ/µm, *256
-MODEL = const(3)  # of the estimate: the pressure that belongs to it, Pa
+MODEL = const(3)  # of the estimate: the pressure that belonged to it when it was last measured, Pa
 CONTENT = const(3)  # of the setpoint: its air, µJ
 START = const(32)  # where the ramp to the target began, µm
-FIRST = const(33)  # first and last segment of its curve, bytes
-LAST = const(34)
-LOWEST = const(35)  # pressures of its curve, Pa
-HIGHEST = const(36)
-OVER = const(37)  # ticks in a row above the pressure limit
-LOST = const(38)  # ticks in a row with the sensor at an end of its range
-ROW = const(39)
+RAMPING = const(33)  # whether the setpoint is not at its target yet
+COAST = const(34)  # whether the next tick goes on as this one
+FIRST = const(35)  # first and last segment of its curve, bytes
+LAST = const(36)
+LOWEST = const(37)  # pressures of its curve, Pa
+HIGHEST = const(38)
+OVER = const(39)  # ticks in a row above the pressure limit
+LOST = const(40)  # ticks in a row with the sensor at an end of its range
+ROW = const(41)
 
 # A knot of a curve, see `curve`.
 H = const(0)  # height, 1/16 µm
@@ -69,8 +72,7 @@ A = const(1)  # air, µJ
 P = const(2)  # pressure, Pa
 S = const(3)  # air per height from here on, µJ/µm, *256
 R = const(4)  # its reciprocal, 2^28/S
-D = const(5)  # pressure per air, Pa/µJ, *4096
-KNOT = const(6)
+KNOT = const(5)
 
 # The board's numbers.
 N = const(0)
@@ -93,14 +95,15 @@ SUPPLY = const(16)  # measured, Pa gauge
 MODE = const(17)
 RAMP_DONE = const(18)  # ticks
 RAMP_TICKS = const(19)
-ROOT_SCALE = const(20)  # supply's absolute pressure, 8 Pa
-ROOT_SHARE = const(21)  # its reciprocal, (2^30 - 1)/Pa
-BOARD = const(22)
+RAMP_SHARE = const(20)  # how much of it is done, *4096
+ROOT_SCALE = const(21)  # supply's absolute pressure, 8 Pa
+ROOT_SHARE = const(22)  # its reciprocal, (2^30 - 1)/Pa
+BOARD = const(23)
 
 # The state: the board's numbers, then the tables of roots, the rows, the curves.
-ROOTS = const(22)
+ROOTS = const(23)
 STEPS = const(64)  # in each of the two tables, see `curve`
-ROWS = const(152)
+ROWS = const(153)
 
 ATMOSPHERE = const(101325)
 AIR_MAX = const(400000)  # more than any bubble of 16 mm holds: keeps every product below within 32 bits
@@ -141,16 +144,14 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
     n = k[N]
     curves = ptr32(uint(k) + 4 * (ROWS + ROW * n))
     tick = k[TICK_US]
-    calm = 1 if mode == k[MODE] else 0
+    same = 1 if mode == k[MODE] else 0
     k[MODE] = mode
     k[SUPPLY] = supply
     k[ROOT_SCALE] = supply + ATMOSPHERE >> 3
     k[ROOT_SHARE] = 0x3FFFFFFF // (supply + ATMOSPHERE)
-    share = 0  # of the ramp, *4096; 0: it stands still
     if k[RAMP_DONE] != k[RAMP_TICKS]:
         k[RAMP_DONE] = k[RAMP_DONE] + 1
-        share = (k[RAMP_DONE] << 12) // k[RAMP_TICKS]
-        calm = 0
+        k[RAMP_SHARE] = (k[RAMP_DONE] << 12) // k[RAMP_TICKS]
     i = 0
     while i < n:
         c = count[i]
@@ -159,6 +160,7 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
             # Guard: the sensor at an end of its range, or too much pressure, now or in the tick before.
             s[ALERT] = 0
             s[CALM] = 0
+            s[COAST] = 0
             s[WAIT] = -1
             if c <= k[COUNT_LOW] or c >= k[COUNT_HIGH]:
                 s[ALERT] = 1
@@ -178,7 +180,7 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
         s[PRESSURE] = p
 
         work = 1
-        if s[CALM] & calm:
+        if s[CALM] & same:
             if s[BUSY] > 0:
                 s[BUSY] = s[BUSY] - tick
                 work = 0
@@ -186,6 +188,12 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                 s[WAIT] = s[WAIT] - 1
                 s[SUM] = s[SUM] + p
                 work = 0
+        elif s[COAST] & same:
+            s[COAST] = 0
+            s[AIR] = s[AIR] + s[DOSE]
+            s[DOSE] = s[NEXT]
+            s[FILL_RUN_US] = s[FILL_RUN_US] + s[FILL_US]
+            work = 0
         if work:
             air = s[AIR] + s[DOSE]
             seg = s[HEIGHT + SEGMENT]
@@ -231,10 +239,17 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                         trust = TRUST_MAX
                     far = s[HEIGHT + SLOPE] * SURPRISE_UM >> 8
                     q = ptr32(uint(curves) + seg)
-                    if (far - off | far + off) >> 31:
-                        if mean - s[HEIGHT + MODEL] > SURPRISE_PA or mean - s[HEIGHT + MODEL] < 0 - SURPRISE_PA:
-                            trust = 1
-                            weight = 1
+                    rise = air - q[A]  # the pressure that the estimate means, within its segment of the tick before
+                    if rise < 0:
+                        rise = 0
+                    if rise > q[KNOT + A] - q[A]:
+                        rise = q[KNOT + A] - q[A]
+                    s[HEIGHT + MODEL] = q[P] + (((rise << 12) // (q[KNOT + A] - q[A])) * (q[KNOT + P] - q[P]) >> 12)
+                    if (far - off | far + off) >> 31 and (
+                        mean - s[HEIGHT + MODEL] > SURPRISE_PA or mean - s[HEIGHT + MODEL] < 0 - SURPRISE_PA
+                    ):
+                        trust = 1
+                        weight = 1
                     s[TRUST] = trust
                     air += (off * weight + (trust >> 1)) // trust  # rounded: a bias would add up over so many
                 else:  # the vent is open: nothing is counted, the sensor alone says what there is
@@ -265,11 +280,12 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
             s[HEIGHT] = height
             s[HEIGHT + SEGMENT] = seg
             s[HEIGHT + SLOPE] = q[S]
-            s[HEIGHT + MODEL] = q[P] + (off * q[D] >> 12)
 
             # The air of the setpoint.
-            if share:
-                height = (s[START] << 4) + ((s[TARGET] - s[START]) * share >> 8)
+            if s[RAMPING]:
+                if k[RAMP_DONE] == k[RAMP_TICKS]:
+                    s[RAMPING] = 0
+                height = (s[START] << 4) + ((s[TARGET] - s[START]) * k[RAMP_SHARE] >> 8)
                 s[SETPOINT] = height
                 seg = s[SETPOINT + SEGMENT]
                 q = ptr32(uint(curves) + seg)
@@ -323,7 +339,7 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                 s[STATUS] = RESTING
                 rest = 1
             if rest:
-                s[CALM] = 1 if vented == tick and share == 0 else 0
+                s[CALM] = 1 if vented == tick and s[RAMPING] == 0 else 0
                 s[NEXT] = 0
                 s[BUSY] = 0
                 s[AIM] = air
@@ -341,11 +357,7 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
             else:
                 off = s[TARGET] - (s[HEIGHT] >> 4)
                 s[STATUS] = MOVING
-                if (
-                    k[RAMP_DONE] == k[RAMP_TICKS]
-                    and s[TRUST] > 1
-                    and (k[SETTLED_UM] - off | k[SETTLED_UM] + off) >> 31 == 0
-                ):
+                if s[RAMPING] == 0 and s[TRUST] > 1 and (k[SETTLED_UM] - off | k[SETTLED_UM] + off) >> 31 == 0:
                     s[STATUS] = SETTLED
                 ahead = aim - s[AIM]  # what the setpoint's own motion asks for: feed-forward
                 error = s[AIM] - air - dose - tail
@@ -354,7 +366,7 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                 s[CALM] = 0
                 band = s[SETPOINT + SLOPE] * k[DEADBAND_UM] >> 8
                 if ahead | (band - error | band + error) >> 31 == 0:
-                    if (energised | dose | share) == 0:
+                    if (energised | dose | s[RAMPING]) == 0:
                         s[CALM] = 1
                 elif s[TRUST]:
                     integral = s[INTEGRAL] + error
@@ -389,11 +401,12 @@ def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int)
                     delay = 0 if opened else s[OPENS_US] - s[CLOSES_US]
                     width = size * 16000 // flow + delay
                     shortest = k[PULSE_MIN_US]
+                    if opened and width > 3 * tick and s[FILL_RUN_US] + 2 * tick < k[FILL_MAX_US]:
+                        s[COAST] = 1
                     if width > tick - shortest:  # too short a gap to close in
                         width = tick if width > tick - (shortest >> 1) else tick - shortest
-                    elif width < shortest:
-                        if opened == 0:  # of open time, half of the shortest or more is worth a pulse
-                            width = shortest if 2 * (width - delay) >= shortest - delay else 0
+                    elif opened == 0 and width < shortest:  # of open time, half of that or more is worth a pulse
+                        width = shortest if 2 * (width - delay) >= shortest - delay else 0
                     if width < tick:
                         # Only while not saturated: the integral must not wind up.
                         if integral > INTEGRAL_MAX:
@@ -448,6 +461,8 @@ def aim(s: ptr32, v: ptr32, at: int, n: int):
         s[START] = s[HEIGHT] >> 4
         s[TARGET] = v[at]
         s[CALM] = 0
+        s[COAST] = 0
+        s[RAMPING] = 1
         s = ptr32(uint(s) + 4 * ROW)
         at += 1
         n -= 1
@@ -493,6 +508,8 @@ def hold(s: ptr32, n: int):
         s[START] = s[HEIGHT] >> 4
         s[TARGET] = s[START]
         s[CALM] = 0
+        s[COAST] = 0
+        s[RAMPING] = 1
         s = ptr32(uint(s) + 4 * ROW)
         n -= 1
 
@@ -504,6 +521,8 @@ def rest(s: ptr32, height: int, n: int):
         s[START] = height
         s[TARGET] = height
         s[CALM] = 0
+        s[COAST] = 0
+        s[RAMPING] = 1
         s = ptr32(uint(s) + 4 * ROW)
         n -= 1
 

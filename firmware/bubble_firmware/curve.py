@@ -2,8 +2,8 @@
 """What a bubble's table means in air, and what pressures mean in flow: made once, so that the tick need not divide.
 
 A *curve* is a table's knots with more said at each, `control` names the places: height, air, pressure, and for the
-segment that begins there air per height, its reciprocal and pressure per air. Air is linear in height between two
-knots; a segment longer than 1 mm is divided, so that this costs less than 20 µm. Air always rises, by at least
+segment that begins there air per height and its reciprocal. Air is linear in height between two
+knots; a segment longer than 1 mm is divided, so that this costs less than 35 µm. Air always rises, by at least
 1 µJ/µm, whatever the table.
 
 *Roots* are what a restrictor's flow is proportional to (ISO 6358, below the critical ratio b):
@@ -32,8 +32,7 @@ _A = const(1)
 _P = const(2)
 _S = const(3)
 _R = const(4)
-_D = const(5)
-_KNOT = const(6)
+_KNOT = const(5)
 
 
 @micropython.viper
@@ -71,7 +70,6 @@ def build(curve: ptr32, knot: ptr16, at: int, first: int, size: int, dead: int) 
                     slope = _SLOPE_MAX
                 curve[before + _S] = slope
                 curve[before + _R] = (1 << 28) // slope
-                curve[before + _D] = (p - curve[before + _P] << 12) // (content - air)
             curve[at + _H] = h << 4
             curve[at + _A] = content
             curve[at + _P] = p

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_firmware import boards, control, nominal, table
+from bubble_firmware import boards, control, curve, nominal, table
 from bubble_firmware.bubbles import Bubbles
 from bubble_protocol import codec, messages
 from bubbleskin import Table, YeohBalloon, build_table
@@ -35,12 +35,16 @@ def test_rows_do_not_overlap():
     row = names[names.index("ZERO") : names.index("SETPOINT")]
     places = [getattr(control, name) for name in row]
     assert places == list(range(len(row)))
-    record = max(control.SEGMENT, control.MODEL, control.CONTENT, control.SLOPE, control.WEIGHED)
+    record = max(control.SEGMENT, control.SLOPE, control.MODEL, control.CONTENT)
     assert record + 1 == control.SETPOINT - control.HEIGHT
-    rest = names[names.index("LOWEST") : names.index("ROW")]
+    rest = names[names.index("START") : names.index("ROW")]
     assert [getattr(control, name) for name in rest] == list(range(control.SETPOINT + record + 1, control.ROW))
     board = names[names.index("N") : names.index("BOARD")]
     assert [getattr(control, name) for name in board] == list(range(control.BOARD))
+    assert control.ROOTS == control.BOARD
+    assert len(curve.roots(128)) == 2 * (control.STEPS + 1) == control.ROWS - control.ROOTS
+    knot = [getattr(control, name) for name in ("H", "A", "P", "S", "R", "KNOT")]
+    assert knot == [getattr(curve, f"_{name}") for name in ("H", "A", "P", "S", "R", "KNOT")] == list(range(6))
 
 
 def test_the_state_is_in_the_schemas_order():
@@ -92,47 +96,90 @@ def test_on_micropython_too(micropython):
 # Air.
 
 
-class Weighed:
-    """What `weigh` says of any height by a table."""
-
-    def __init__(self, knots):
-        tables = table.Tables(BOARD.BUBBLES)
-        tables.write_size(0, len(knots))
-        for index, (height, pressure) in enumerate(knots):
-            tables.write_knot(0, index, height, pressure)
-        tables.swap()
-        self.bubbles = Bubbles(BOARD, tables)
-
-    def __call__(self, height_um):
-        row = self.bubbles._rows
-        row[control.HEIGHT] = height_um << 4
-        row[control.HEIGHT + control.WEIGHED] = -1
-        self.bubbles.decide()
-        return [row[control.HEIGHT + place] for place in (control.MODEL, control.CONTENT, control.SLOPE)]
+def bubbles_with(knots):
+    """A board's bubbles, the first one with a table of its own; and its curve, (knots, numbers of a knot)."""
+    tables = table.Tables(BOARD.BUBBLES)
+    tables.write_size(0, len(knots))
+    for index, (height, pressure) in enumerate(knots):
+        tables.write_knot(0, index, int(height), int(pressure))
+    tables.swap()
+    bubbles = Bubbles(BOARD, tables)
+    size = bubbles._rows[control.LAST] // 4 // control.KNOT + 2
+    return bubbles, np.array(bubbles._curves[: size * control.KNOT]).reshape(size, control.KNOT)
 
 
-@pytest.mark.parametrize("mu", [30e3, 39.62e3, 50e3], ids=["soft", "nominal", "snap-through"])
-def test_air_and_its_slope_are_those_of_a_sphere(mu):
-    """pV in µJ and its derivative in µJ/µm, from 5 to 14 mm, against floats and the exact segment."""
-    made = build_table(YeohBalloon(mu=mu))
-    knots = list(zip(made.height_um.tolist(), made.pressure_pa.tolist(), strict=True))
-    weighed = Weighed(knots)
-    heights = np.arange(5000, 14000, 7)
-    model, content, slope = np.array([weighed(int(height)) for height in heights]).T
-    assert (model == made.pressure_at(heights)).all()
+def air(height_um, pressure):
+    """pV of sphere and line, µJ."""
+    volume = math.pi / 6 * (height_um * 1e-3) ** 3 + BOARD.DEAD_VOLUME_MM3
+    return (pressure + ATMOSPHERE) * volume / 1000
 
-    h = heights * 1e-3  # mm
-    p = np.interp(heights, made.height_um, made.pressure_pa) + ATMOSPHERE
-    segment = np.searchsorted(made.height_um, heights, side="right") - 1
-    steep = (np.diff(made.pressure_pa) / np.diff(made.height_um))[segment]  # Pa/µm
-    volume = math.pi / 6 * h**3 + BOARD.DEAD_VOLUME_MM3  # mm³; 1 µJ = 1000 Pa mm³
-    air = p * volume / 1000
-    rise = p * math.pi / 2 * h**2 / 1e6 + volume * steep / 1000
-    air_error = np.abs(content / air - 1)
-    slope_error = np.abs(slope / 256 / rise - 1)
-    print(f"air within {air_error.max():.2e}, slope within {slope_error.max():.2e}")
-    assert air_error.max() < 1e-3
-    assert slope_error.max() < 5e-3
+
+TABLES = {
+    name: build_table(YeohBalloon(mu=mu)) for name, mu in (("soft", 30e3), ("nominal", 39.62e3), ("snap-through", 50e3))
+} | {"sparse": Table(np.array([5000, 5500, 9000, 14000]), np.array([0, 20000, 21000, 36000]))}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_curve_says_of_the_table_what_a_sphere_holds(name):
+    """pV in µJ and its slope in µJ/µm, from 5 to 14 mm, against floats and the exact segment."""
+    made = TABLES[name]
+    _, knots = bubbles_with(list(zip(made.height_um, made.pressure_pa, strict=True)))
+    h = knots[:, control.H] / 16
+    assert np.diff(h).max() <= 1024
+    assert set(made.height_um) <= set(h)
+    assert np.abs(knots[:, control.P] - np.interp(h, made.height_um, made.pressure_pa)).max() <= 1
+
+    heights = np.arange(5000.0, 14000.0, 7.0)
+    exact = air(heights, np.interp(heights, made.height_um, made.pressure_pa))
+    slope = np.diff(knots[:, control.A]) / np.diff(h)
+    off = np.abs(np.interp(heights, h, knots[:, control.A]) - exact) / slope[np.searchsorted(h, heights, "right") - 1]
+    print(f"{name}: air within {off.max():.1f} µm of height")
+    assert off.max() < (35 if name == "sparse" else 6)
+    assert knots[:-1, control.S] == pytest.approx(256 * slope, rel=1e-3)
+    assert knots[:-1, control.R] == pytest.approx(2**28 / knots[:-1, control.S], abs=1)
+
+
+def test_air_rises_whatever_the_table():
+    for knots in extreme_tables(random.Random(0)):
+        _, made = bubbles_with(knots)
+        assert (np.diff(made[:, control.H]) > 0).all()
+        assert (np.diff(made[:, control.A]) > 0).all()
+        assert made[:, control.A].max() < control.AIR_MAX
+        assert len(made) <= curve.KNOTS_MAX
+
+
+@pytest.mark.parametrize("name", ["soft", "nominal", "sparse"])
+def test_pressure_is_read_back_as_the_tables_height(name):
+    """At rest the sensor alone says how high a bubble is: within what its counts resolve, where there is one height."""
+    made = TABLES[name]
+    bubbles, _ = bubbles_with(list(zip(made.height_um, made.pressure_pa, strict=True)))
+    counts = array("H", [BOARD.SENSOR_ZERO] * (BOARD.BUBBLES + 1))
+    for step in range(0, int(made.pressure_pa.max()) // BOARD.SENSOR_PA_PER_COUNT, 7):
+        counts[0] = BOARD.SENSOR_ZERO + step
+        for _ in range(9):
+            bubbles.step(counts, 60000, messages.VENTED)
+        pressure = step * BOARD.SENSOR_PA_PER_COUNT
+        assert (
+            bubbles._rows[control.HEIGHT] / 16
+            == pytest.approx(np.interp(pressure, made.pressure_pa, made.height_um), abs=8 if name == "sparse" else 4)
+            or name == "soft"
+        )
+
+
+@pytest.mark.parametrize("critical", [77, 128])
+def test_roots_are_those_of_iso_6358(critical):
+    b = critical / 256
+    filling, venting = np.array(curve.roots(critical)).reshape(2, control.STEPS + 1)
+
+    def root(p1, p2):
+        p2 = np.maximum(p2, b * p1)  # choked
+        return np.sqrt((p1 - p2) * (p2 + (1 - 2 * b) * p1))
+
+    share = np.linspace(0.04, 0.5, 300)
+    assert np.interp(128 * share, np.arange(65), filling) / 2**14 == pytest.approx(root(1.0, 1 - share), rel=3e-3)
+    pressure = np.linspace(3000, 42000, 300)
+    found = np.interp(pressure / 1024, np.arange(65), venting)
+    assert found == pytest.approx(root(pressure + ATMOSPHERE, ATMOSPHERE) / 8, rel=4e-3)
 
 
 # 32 bits.

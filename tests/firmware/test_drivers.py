@@ -226,7 +226,36 @@ def test_what_has_not_changed_is_only_sent_again_when_asked(expander):
     driver.write(pulses, False)
     assert not any(chip.registers[6:70])
     driver.write(pulses, True)
-    assert any(chip.registers[6:70])
+    assert sum(map(any, zip(*[iter(chip.registers[6:54])] * 8, strict=True))) == 1, "one bubble at a time"
+    for _ in range(5):
+        driver.write(pulses, True)
+    assert all(map(any, zip(*[iter(chip.registers[6:54])] * 8, strict=True))), "in the end all six"
+
+
+@pytest.mark.parametrize("bubbles", [(7,), (9, 12), (7, 8, 12)])
+def test_what_has_changed_is_sent_and_nothing_else(expander, bubbles):
+    chip, _, driver = expander
+    pulses = array("H", [1500] * 38)
+    driver.write(pulses, False)
+    sent = bytearray(chip.registers)
+    written = []
+    chip.write, write = lambda data: (written.append(data), write(data)), chip.write
+    for bubble in bubbles:
+        pulses[2 * bubble] = 2500
+    driver.write(pulses, False)
+    changed = {at for at in range(256) if chip.registers[at] != sent[at]}
+    assert {(at - 6) // 8 + 7 for at in changed} == set(bubbles)
+    assert sum(map(len, written)) == (9 * len(bubbles) if len(bubbles) < 3 else 49)
+
+
+def test_a_driver_that_starts_again_sends_everything(expander):
+    chip, _, driver = expander
+    pulses = array("H", [1500] * 38)
+    driver.write(pulses, False)
+    chip.registers[6:54] = bytes(48)
+    driver.start()
+    driver.write(pulses, False)
+    assert all(map(any, zip(*[iter(chip.registers[6:54])] * 8, strict=True)))
 
 
 def test_an_expander_that_does_not_answer_is_left_alone_until_started(expander):

@@ -13,6 +13,7 @@ a fill output is on from count 0 to its width, a vent output, inverted, from its
 `bus` is a `machine.I2C`: `writeto`, `readfrom_into`. It raises OSError when a chip does not answer.
 """
 
+from bubble_protocol.framing import copy
 from bubble_protocol.portable import const, micropython, ptr8, ptr16
 
 _LED0 = 6
@@ -27,12 +28,13 @@ _FULL = const(16)  # bit 12, in the high byte
 
 @micropython.viper
 def encode(out: ptr8, pulse: ptr16, first: int, bubbles: int, tick_us: int, scale: int) -> int:
-    """Put the outputs of `bubbles` bubbles from number `first` on into `out[1:]`; returns whether any has changed.
+    """Put the outputs of `bubbles` bubbles from number `first` on into `out[1:]`; returns those that have changed.
 
-    `scale` is counts per µs, << 16.
+    One bit a bubble. `scale` is counts per µs, << 16.
     """
     at = 1
     changed = 0
+    bit = 1
     valve = 2 * first
     stop = valve + 2 * bubbles
     vent = 0
@@ -50,7 +52,7 @@ def encode(out: ptr8, pulse: ptr16, first: int, bubbles: int, tick_us: int, scal
             on = off
             off = 0
         if out[at] | out[at + 1] << 8 != on or out[at + 2] | out[at + 3] << 8 != off:
-            changed = 1
+            changed |= bit
             out[at] = on & 255
             out[at + 1] = on >> 8
             out[at + 2] = off & 255
@@ -58,6 +60,8 @@ def encode(out: ptr8, pulse: ptr16, first: int, bubbles: int, tick_us: int, scal
         at += 4
         valve += 1
         vent = 1 - vent
+        if vent == 0:
+            bit += bit
     return changed
 
 
@@ -77,6 +81,8 @@ class Pca9685:
         self._scale = (COUNTS << 16) // tick_us
         self._frame = bytearray(1 + 8 * bubbles)
         self._frame[0] = _LED0
+        self._part = bytearray(1 + 8)
+        self._turn = 0
         self._mode = bytearray(1)  # MODE1
 
     def start(self):
@@ -87,15 +93,37 @@ class Pca9685:
         self._command(b"\xfe\x04")  # PRE_SCALE
         self._command(b"\x01\x04")  # MODE2: totem pole, outputs low while /OE is high
         self._command(b"\x00\x70")  # auto-increment
+        for index in range(1, len(self._frame)):
+            self._frame[index] = 255  # no output: the next `write` sends all
 
     def wake(self):
         """Count: outputs follow what has been written."""
         self._command(b"\x00\x60")  # MODE1: EXTCLK, auto-increment, awake
 
     def write(self, pulses, again):
-        """Set the next period; what has not changed is only sent `again` where that is wanted."""
-        if encode(self._frame, pulses, self._first, self._bubbles, self._tick_us, self._scale) or again:
+        """Set the next period. What has not changed is only sent `again`, one bubble at a time, where that is wanted."""
+        changed = encode(self._frame, pulses, self._first, self._bubbles, self._tick_us, self._scale)
+        if again:
+            turn = self._turn + 1
+            if turn >= self._bubbles:
+                turn = 0
+            self._turn = turn
+            changed |= 1 << turn
+        if not changed:
+            return
+        more = changed & (changed - 1)  # without the first
+        if more & (more - 1):  # three or more: all at once is quicker
             self._command(self._frame)
+            return
+        part = self._part
+        at = 1
+        while changed:
+            if changed & 1:
+                part[0] = _LED0 - 1 + at
+                copy(self._frame, at, at + 8, part, 1)
+                self._command(part)
+            changed >>= 1
+            at += 8
 
     def check(self):
         """See that the chip is there and awake: one that has lost its power sleeps."""

