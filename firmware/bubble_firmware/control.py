@@ -479,6 +479,9 @@ def aim_on(s: ptr32, w: ptr16, at: int, n: int, from_height: int, rest: int):
         target = w[at]
         if target != LEAVE:
             s[TARGET] = target if target > rest else rest  # lower would be the end of the ramp before its time
+        s[CALM] = 0
+        s[COAST] = 0
+        s[RAMPING] = 1
         s = ptr32(uint(s) + 4 * ROW)
         at += 1
         n -= 1
