@@ -34,7 +34,7 @@ class Content:
         self._settings = app.settings.values if hasattr(app, "settings") else array("i")
         self._default_settings = array("i", self._settings)
         self._figures = array("i", bytearray(4 * figures.COUNT * n))
-        self._found = array("i", bytearray(4 * max(len(self._settings), figures.COUNT * n)))
+        self._found = array("i", bytearray(8 * len(self._settings)))
         self.size_max = 3 * _SECTION + n + n * _BUBBLE_KNOTS + 4 * len(self._settings) + 2 * figures.COUNT * n
 
     def write(self, data, at):
@@ -118,15 +118,16 @@ class Content:
         return tables.first_flaw(board.HEIGHT_MAX_UM, board.PRESSURE_MAX_PA) < 0
 
     def _take_settings(self, data, at, size):
-        settings = self._settings
-        for index in range(min(size // 4, len(settings))):
-            self._found[index] = get32(data, at + 4 * index)
-        for index in range(size // 4, len(settings)):
-            self._found[index] = settings[index]
-        if hasattr(self._app, "settings") and self._app.settings.first_flaw(self._found) >= 0:
+        count = min(size // 4, len(self._settings))
+        for index in range(count):
+            self._found[2 * index] = index
+            self._found[2 * index + 1] = get32(data, at + 4 * index)
+        if not count:
+            return True
+        settings = self._app.settings
+        if settings.flaw(self._found, 0, count) >= 0:
             return False
-        for index in range(len(settings)):
-            settings[index] = self._found[index]
+        settings.use()
         return True
 
     def _take_figures(self, data, at, size):

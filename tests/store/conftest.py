@@ -21,9 +21,17 @@ class Settings:
 
     def __init__(self):
         self.values = array("i", (250, 1000, -5))
+        self.wanted = array("i", self.values)
 
-    def first_flaw(self, values):
-        return 0 if values[0] < 0 else -1
+    def flaw(self, values, at, count):
+        """Of `count` pairs of setting and value."""
+        self.wanted[:] = self.values
+        for index in range(count):
+            self.wanted[values[at + 2 * index]] = values[at + 2 * index + 1]
+        return 0 if self.wanted[0] < 0 else -1
+
+    def use(self):
+        self.values[:] = self.wanted
 
 
 def board(name="wristband7", bubbles=None):

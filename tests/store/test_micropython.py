@@ -19,9 +19,16 @@ from bubble_firmware.table import Tables
 class Settings:
     def __init__(self):
         self.values = array("i", (250, -1000, 0x7FFFFFFF, -0x80000000))
+        self.wanted = array("i", self.values)
 
-    def first_flaw(self, values):
-        return -1
+    def flaw(self, values, at, count):
+        self.wanted[:] = self.values
+        for index in range(count):
+            self.wanted[values[at + 2 * index]] = values[at + 2 * index + 1]
+        return 0 if self.wanted[0] < 0 else -1
+
+    def use(self):
+        self.values[:] = self.wanted
 
 
 class Device:
