@@ -94,14 +94,14 @@ class Day:
         self.board.inject("sensor_absent", bubble, 1)
         self.skin.sleep(1.0)
         if bubble not in self.skin.faults():
-            raise Unexpected(f"bubble {bubble} has no sensor and no fault")
+            raise MismatchError(f"bubble {bubble} has no sensor and no fault")
         self.board.inject("sensor_absent", bubble, 0)
         self.skin.vent()
         self.skin.sleep(2.0)
         self.skin.clear_faults()
         self.skin.sleep(0.1)
         if self.skin.faults():
-            raise Unexpected(f"mended and cleared, and still there: {self.skin.faults()}")
+            raise MismatchError(f"mended and cleared, and still there: {self.skin.faults()}")
 
     def reconnect(self) -> None:
         """The cable is pulled in the middle of a frame, and another program says hello."""
@@ -140,11 +140,11 @@ class Day:
             said["free heap"] = (health.heap_free, heap)
         wrong = [f"{name} {is_}, expected {should}" for name, (is_, should) in said.items() if is_ != should]
         if wrong:
-            raise Unexpected("; ".join(wrong))
+            raise MismatchError("; ".join(wrong))
         return health.heap_free
 
 
-class Unexpected(Exception):
+class MismatchError(Exception):
     """What the wristband says is not what was done to it."""
 
 
@@ -179,7 +179,7 @@ def main() -> None:
                 f"{day.telemetry} states, heap {heap} bytes free, {time.monotonic() - began:.0f} s",
                 flush=True,
             )
-    except (Unexpected, BubbleskinError) as error:
+    except (MismatchError, BubbleskinError) as error:
         print(f"{board.time / HOUR:.3f} h: {error}", flush=True)
         sys.exit(1)
     finally:

@@ -31,6 +31,7 @@ from bubble_firmware.ticks import bins, count
 from bubble_protocol.messages import ACTIVE, EXCEPTION, HOLDING, SELF_TEST, SUPPLY_LOST, VENTED, VENTING
 
 _TIDY_MASK = 1023  # ticks
+_TICKS_MASK = (1 << 30) - 1  # more, and counting allocates: ticks begin again after 62 days
 
 
 class App:
@@ -67,7 +68,7 @@ class App:
         except Exception:
             self._fail()
             self.session.fail()
-        self.ticks += 1
+        self.ticks = self.ticks + 1 & _TICKS_MASK
 
     def _control(self):
         hands = self.hands

@@ -8,6 +8,7 @@ from array import array
 
 from bubble_firmware import control
 from bubble_firmware.table import KNOTS_MAX
+from bubble_firmware.telemetry import Telemetry
 from bubble_firmware.ticks import BINS
 from bubble_protocol import codec, framing, messages
 from bubble_protocol.crc import crc32_into, crc32_word
@@ -30,11 +31,8 @@ class Session:
         self._frame = bytearray(framing.FRAME_MAX)
         self._values = array("i", bytearray(4 * framing.PAYLOAD_MAX))
         self._handling = 0  # id of the request being handled
-        self._period = 0  # telemetry, ticks; 0: none
-        self._wait = 0
-        self._telemetry_sequence = 0
+        self._telemetry = Telemetry(app)
         self._owed = 0  # length of a reply in `_frame` that found no room
-        self.telemetry_dropped = 0
         self._heap_free = heap_free()
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
@@ -48,6 +46,7 @@ class Session:
             messages.SHOW: self._show,
             messages.STATE: self._state,
             messages.SUBSCRIBE: self._subscribe,
+            messages.SUBSCRIBE_FIELDS: self._subscribe_fields,
             messages.TABLE_WRITE: self._table_write,
             messages.TABLE_COMMIT: self._table_commit,
             messages.TABLE_READ: self._table_read,
@@ -70,11 +69,8 @@ class Session:
             at = decoder.feed(chunk, at, end)
             if decoder.length:
                 self._handle(decoder.message_id, decoder.length - framing.HEADER)
-        if self._period:
-            self._wait -= 1
-            if self._wait <= 0:
-                self._wait = self._period
-                self._telemetry()
+        if self._telemetry.is_due():
+            self._tell()
 
     def fail(self):
         """Tell the host whose request was being handled that the device failed at it: once, if the link still works."""
@@ -127,7 +123,7 @@ class Session:
         if values[0] > PROTOCOL_MAX or values[1] < PROTOCOL_MIN:
             self._refuse(messages.NO_COMMON_PROTOCOL, 1, _NO_ELEMENT, values[1], PROTOCOL_MIN, PROTOCOL_MAX)
             return
-        self._period = 0  # a new host has not subscribed
+        self._telemetry.subscribe(0, 0)  # a new host has not subscribed
         values[0] = PROTOCOL_MIN
         values[1] = PROTOCOL_MAX
         values[2] = self._schema_crc
@@ -141,7 +137,7 @@ class Session:
         values[26] = board.HEIGHT_MAX_UM
         values[27] = board.PRESSURE_MAX_PA
         values[28] = 1  # one request at a time
-        values[29] = 0
+        values[29] = messages.CAN_CHOOSE_TELEMETRY
         values[30] = self._app.tables.crc
         self._reply(0)
 
@@ -159,7 +155,7 @@ class Session:
         values[3] = app.exceptions
         values[4] = self._decoder.good
         values[5] = self._decoder.bad
-        values[6] = self.telemetry_dropped
+        values[6] = self._telemetry.dropped
         if app.mode == VENTED:  # counting takes longer than a tick
             app.hands.slack()
             self._heap_free = heap_free()
@@ -195,9 +191,15 @@ class Session:
         self._reply(self._fill_state())
 
     def _subscribe(self, count):
-        self._period = self._wait = self._values[0]
-        self._telemetry_sequence = 0
+        self._telemetry.subscribe(self._values[0], 0)
         self._acknowledge()
+
+    def _subscribe_fields(self, count):
+        telemetry = self._telemetry
+        if telemetry.subscribe(self._values[0], self._values[1]):
+            self._acknowledge()
+        else:  # the limit is one of how many, not of which
+            self._refuse(messages.OUT_OF_RANGE, 1, _NO_ELEMENT, self._values[1], 1, (1 << telemetry.most) - 1)
 
     def _table_write(self, count):
         values = self._values
@@ -308,14 +310,14 @@ class Session:
         values[6] = high
         self._send(messages.ERROR, self._decoder.sequence, 0)
 
-    def _telemetry(self):
-        self._telemetry_sequence = (self._telemetry_sequence + 1) & 0xFFFF
+    def _tell(self):
+        telemetry = self._telemetry
         if self._owed:  # a reply comes first, and stands in the frame
-            self.telemetry_dropped += 1
+            telemetry.drop()
             return
-        length = self._pack(messages.TELEMETRY, self._telemetry_sequence, self._fill_state())
+        length = self._pack(telemetry.message_id, telemetry.sequence, telemetry.fill(self._values))
         if not self._app.hands.send(self._frame, length):
-            self.telemetry_dropped += 1
+            telemetry.drop()
 
     def _send(self, message_id, sequence, count):
         length = self._pack(message_id, sequence, count)

@@ -128,6 +128,7 @@ SEQUENCES = [
     pytest.param(ACTIVE, id="active"),
     pytest.param(("SHOW up", "HELLO", "STOP", "SHOW down", "VENT", "CLEAR", "TABLE_READ"), id="everything"),
     pytest.param(("SHOW up", "garbage", "too high", "wrong count", "wrong length", "unknown"), id="refused"),
+    pytest.param(("SUBSCRIBE_FIELDS", "SHOW up", "PING", "SHOW down", "INFO"), id="telemetry columns"),
     pytest.param(("TABLE_WRITE", "SHOW up", "STATE"), id="tables"),
 ]
 
@@ -141,6 +142,7 @@ def request(name, n):
         "PING": lambda: wire.encode("PING", 3, (0xFEDCBA98,)),
         "HELLO": lambda: wire.encode("HELLO", 4, (1, 1)),
         "SUBSCRIBE": lambda: wire.encode("SUBSCRIBE", 5, (20000 // boards.load(f"wristband{n}").TICK_US,)),  # 50 Hz
+        "SUBSCRIBE_FIELDS": lambda: wire.encode("SUBSCRIBE_FIELDS", 13, (2, 0b11100111 if n == 7 else 0b11100011)),
         "TABLE_READ": lambda: wire.encode("TABLE_READ", 6, (1, 10)),
         "TABLE_WRITE": lambda: wire.encode("TABLE_WRITE", 7, (1, 4, 60), [(9000, 65535)] * 40),
         "garbage": lambda: bytes(range(1, 200)) + b"\0",
