@@ -76,8 +76,9 @@ another number after every boot, so that a host notices when the wristband has f
 
 ## Time
 
-The wristband counts ticks of `tick_us` since it booted, and begins again after 2³⁰ of them, 62 days; `ticks` in a reply is the tick in which it was made. PING's
-reply also has the time since that tick began: device time in µs is `ticks` × `tick_us` + `phase_us`.
+The wristband counts ticks of `tick_us` since it booted, and begins again after 2³⁰ of them, 62 days; `ticks` in a reply
+is the tick in which it was made. PING's reply also has the time since that tick began: device time in µs is
+`ticks` × `tick_us` + `phase_us`.
 
 ## Telemetry
 

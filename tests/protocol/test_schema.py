@@ -9,7 +9,13 @@ from bubble_protocol.messages import I16, I32, MESSAGES, REPLY, TEXT, U8, U16, U
 from bubbleskin.link import wire
 from bubbleskin.sim.board import BOARDS
 
-RANGES = {U8: (0, 0xFF), U16: (0, 0xFFFF), U32: (0, 0xFFFFFFFF), I16: (-(1 << 15), (1 << 15) - 1), I32: (-(1 << 31), (1 << 31) - 1)}
+RANGES = {
+    U8: (0, 0xFF),
+    U16: (0, 0xFFFF),
+    U32: (0, 0xFFFFFFFF),
+    I16: (-(1 << 15), (1 << 15) - 1),
+    I32: (-(1 << 31), (1 << 31) - 1),
+}
 UNASKED = {messages.TELEMETRY, messages.TELEMETRY_FIELDS, messages.ERROR}
 BUBBLES = 24  # the largest board a frame has room for
 

@@ -42,7 +42,8 @@ def _one_way(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float64], NDA
 def _stalls(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Each way is held up by another 20 ms for a second or so, half of the time."""
     held = np.cumsum(rng.random((2, n)) < PING, axis=1) % 2 * 20e-3
-    return tuple(held + rng.exponential(1e-3, (2, n)))  # type: ignore[return-value]
+    out, back = held + rng.exponential(1e-3, (2, n))
+    return out, back
 
 
 LAWS: dict[str, Law] = {

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubbleskin.errors import LinkError
+from bubbleskin.link.wire import Received
 
 WINDOW = 60.0
 """Seconds of round trips that are kept, before the newest."""
@@ -45,7 +46,7 @@ class _Best(NamedTuple):
     sent: float
     high: float
     quickest: float
-    count: int
+    pings: int
 
 
 class _Bounds(NamedTuple):
@@ -82,6 +83,10 @@ class Clock:
             device = self._unwrapped(device_ticks) * self._tick + phase_us * 1e-6
             self._keep(sent, received, device)
 
+    def hear(self, sent: float, reply: Received, received: float) -> None:
+        """Take a PING's reply: what a link calls as its `on_ping`."""
+        self.observe(sent, received, reply["ticks"], reply["phase_us"])
+
     def reset(self) -> None:
         """Forget everything, as after the device's reboot."""
         self._best.clear()
@@ -91,7 +96,7 @@ class Clock:
     @property
     def pings(self) -> int:
         """Round trips in the window."""
-        return sum(best.count for best in self._best.values())
+        return sum(best.pings for best in self._best.values())
 
     @property
     def age(self) -> float:
@@ -161,7 +166,7 @@ class Clock:
                 *((received, low) if low > old.low else (old.received, old.low)),
                 *((sent, high) if high < old.high else (old.sent, old.high)),
                 min(old.quickest, received - sent),
-                old.count + 1,
+                old.pings + 1,
             )
         self._best[bucket] = best
         for gone in [key for key in self._best if key <= bucket - _BUCKETS]:

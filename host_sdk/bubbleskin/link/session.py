@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
 
@@ -10,13 +9,13 @@ from bubble_protocol import codec, messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.errors import DeviceRefused, DeviceSilent, LinkError, WrongDevice
 from bubbleskin.link import wire
+from bubbleskin.link.inbox import UNASKED, Inbox
 from bubbleskin.link.transport import Transport
 
 RESEND = 0.25
 """Seconds after which a request without a reply is sent again. Every request of this version may be
 handled twice with the same outcome."""
 
-_TELEMETRY_KEPT = 4096
 _SLICE = 0.02
 """Seconds for which one task reads before another has its turn."""
 
@@ -34,7 +33,8 @@ class Link:
     def __init__(self, transport: Transport, timeout: float, *, event_loop: bool = False):
         self.transport = transport
         self.timeout = timeout
-        self.telemetry: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
+        self.telemetry = Inbox()
+        self.on_ping: Callable[[float, wire.Received, float], None] = lambda sent, reply, received: None
         self._event_loop = event_loop
         self._reader = wire.Reader()
         self._heard = False
@@ -106,7 +106,7 @@ class Link:
     def _take(self, data: bytes) -> None:
         self._heard = self._heard or bool(data)
         for message in self._reader.feed(data):
-            if message.id == messages.TELEMETRY:
+            if message.id in UNASKED:
                 self.telemetry.append(message)
             elif message.id & messages.REPLY or message.id == messages.ERROR:
                 if len(self._replies) > 64:
