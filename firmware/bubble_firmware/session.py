@@ -58,7 +58,13 @@ class Session:
         }
 
     def poll(self):
-        """Handle what has come since the last tick; send telemetry when it is due."""
+        """Once a tick: handle what has come; send telemetry when it is due."""
+        self.listen()
+        if self._telemetry.is_due():
+            self._tell()
+
+    def listen(self):
+        """Handle what has come."""
         if self._owed and self._app.hands.send(self._frame, self._owed):
             self._owed = 0
         chunk = self._chunk
@@ -69,8 +75,6 @@ class Session:
             at = decoder.feed(chunk, at, end)
             if decoder.length:
                 self._handle(decoder.message_id, decoder.length - framing.HEADER)
-        if self._telemetry.is_due():
-            self._tell()
 
     def fail(self):
         """Tell the host whose request was being handled that the device failed at it: once, if the link still works."""

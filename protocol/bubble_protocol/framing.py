@@ -11,7 +11,7 @@ Nothing here allocates once made, reads a clock or does I/O. `crc32_into(buffer,
 the caller's: crcmod on the host, `bubble_protocol.crc` on the device.
 """
 
-from bubble_protocol.portable import micropython, ptr8
+from bubble_protocol.portable import COMPILED, micropython, ptr8
 
 HEADER = 3  # id, sequence number
 CRC = 4
@@ -54,6 +54,21 @@ def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
         target[at] = source[start]
         at += 1
         start += 1
+
+
+if not COMPILED:  # CPython loops over bytes slowly, and searches and slices in C
+
+    def _stuff(frame, end):
+        at = 0
+        i = frame.find(_ZERO, 1, end + 1)
+        while i > 0:
+            frame[at] = i - at
+            at = i
+            i = frame.find(_ZERO, i + 1, end + 1)
+
+    def copy(source, start, end, target, at):
+        """As above."""
+        target[at : at + end - start] = source[start:end]
 
 
 def seal(frame, length, crc32_into):

@@ -11,7 +11,7 @@ from bubble_firmware import boards
 from bubble_firmware.app import App
 
 class Hands:
-    # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick.
+    # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick and between ticks.
     boot_id = 1
     late_ticks = 0
     alarms = boot_faults = 0
@@ -100,6 +100,7 @@ def ticks(app, count):
         count -= 1
         micropython.heap_lock()
         app.tick()
+        app.listen()
         micropython.heap_unlock()
 
 def measure(app, hands):
@@ -160,7 +161,7 @@ def test_the_tick_allocates_nothing(micropython, board, sequence):
     n = boards.load(board).BUBBLES
     requests = b"".join(request(name, n) for name in sequence)
     said, failing = micropython(
-        SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=17, ticks=4000)
+        SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=9, ticks=4000)
     ).splitlines()
     grown, exceptions, good, sent, fills, vents, rests = map(int, said.split())
     assert exceptions == 0, "MemoryError while the heap was locked"

@@ -240,7 +240,7 @@ def test_more_columns_than_a_frame_has_room_for_are_refused(rig):
 
 
 def test_ticks_begin_again_before_they_would_allocate(rig7):
-    rig7.app.ticks = (1 << 30) - 2
+    rig7.app.ticks = (1 << 30) - 3
     assert [rig7.ask("PING", (1,))["ticks"] for _ in range(4)] == [(1 << 30) - 2, (1 << 30) - 1, 0, 1]
 
 

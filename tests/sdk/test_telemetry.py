@@ -120,9 +120,7 @@ def test_a_recording_is_read_by_pandas_in_one_line(skin, tmp_path, suffix):
     assert len(frame) == recording.rows > 60
     assert (recording.lost, frame.lost.max()) == (0, 0)
     np.testing.assert_allclose(np.diff(frame.time_s), 0.02, atol=1e-9)
-    np.testing.assert_allclose(
-        frame[[f"height_mm_{b}" for b in range(7)]].iloc[-1], skin.simulated.height_mm, atol=0.3
-    )
+    np.testing.assert_allclose(frame[[f"height_mm_{b}" for b in range(7)]].iloc[-1], skin.simulated.height_mm, atol=0.3)
     np.testing.assert_allclose(frame[[f"target_mm_{b}" for b in range(7)]].iloc[-1], np.linspace(6, 12, 7))
     assert set(frame.status_2) <= {"moving", "settled", "resting"}
     assert list(tmp_path.iterdir()) == [path]

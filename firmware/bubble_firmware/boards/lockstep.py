@@ -2,13 +2,17 @@
 
 All words are little-endian and blocks have a fixed size, the link's bytes at their end:
     into the firmware, per tick: u16 size of the link's bytes, u16 counts (per bubble, then the supply's), LINK_IN bytes
-    out of it, per tick: u16 size of the link's bytes, u16 pulses (fill and vent per bubble), u16 pump, u16 dump, LINK_OUT bytes
+        with LISTEN_ONLY in the size, no period has begun: the first count is then the time since the last one did, in µs
+    out of it, per block: u16 size of the link's bytes, u16 pulses (fill and vent per bubble), u16 pump, u16 dump, LINK_OUT bytes
 """
 
 import sys
 
+from bubble_firmware.app import LISTEN
+
 LINK_IN = 256
 LINK_OUT = 1024
+LISTEN_ONLY = 0x8000
 
 
 class Hands:
@@ -28,17 +32,26 @@ class Hands:
         self._link_in = len(self._in) - LINK_IN
         self._link_out = len(self._out) - LINK_OUT
         self._sent = 0
-        self._ticked = False
+        self._phase_us = 0
+        self._answered = True
 
     def wait(self):
-        """Hand over what the last tick decided and wait for the next; False when the pipe has closed."""
-        if self._ticked:
+        """Hand over what the last block led to and wait for the next; 0 when the pipe has closed."""
+        if not self._answered:
             out = self._out
             _put(out, 0, self._sent)
             self._stdout.write(out)
             self._sent = 0
-        self._ticked = True
-        return self._stdin.readinto(self._in) == len(self._in)  # type: ignore[union-attr]
+        self._answered = False
+        block = self._in
+        if self._stdin.readinto(block) != len(block):  # type: ignore[union-attr]
+            return 0
+        if block[1] & LISTEN_ONLY >> 8:
+            block[1] &= 255 - (LISTEN_ONLY >> 8)
+            self._phase_us = block[2] | block[3] << 8
+            return LISTEN
+        self._phase_us = 0
+        return 1
 
     def sense(self, counts):
         """Fill in the counts of this tick."""
@@ -103,8 +116,8 @@ class Hands:
         """There is nothing to start again from."""
 
     def phase_us(self):
-        """Time stands still within a tick."""
-        return 0
+        """Time stands still within a tick; between ticks it is told."""
+        return self._phase_us
 
 
 def _put(block, at, value):

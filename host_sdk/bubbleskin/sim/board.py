@@ -36,6 +36,9 @@ class Firmware(Protocol):
     def tick(self, counts: array, link: bytes) -> Outputs:
         """One period: sensor counts (the supply's last) and bytes of the link in, decisions out."""
 
+    def listen(self, link: bytes, phase_us: int) -> Outputs:
+        """Bytes of the link so many µs after a period has begun."""
+
     def close(self) -> None:
         """End it."""
 
@@ -57,6 +60,7 @@ class InProcessFirmware:
         self._dump = False
         self._in = b""
         self._out = bytearray()
+        self._phase_us = 0
         self.app = App(board, self)
 
     def tick(self, counts: array, link: bytes) -> Outputs:
@@ -64,7 +68,16 @@ class InProcessFirmware:
         self._counts = counts
         self._in = link
         self._out.clear()
+        self._phase_us = 0
         self.app.tick()
+        return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
+
+    def listen(self, link: bytes, phase_us: int) -> Outputs:
+        """See `Firmware`."""
+        self._in = link
+        self._out.clear()
+        self._phase_us = phase_us
+        self.app.listen()
         return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
 
     def close(self) -> None:
@@ -111,8 +124,8 @@ class InProcessFirmware:
         """There is nothing to start again from."""
 
     def phase_us(self) -> int:
-        """Time stands still within a tick."""
-        return 0
+        """Time stands still within a tick; between ticks it is told."""
+        return self._phase_us
 
 
 class SimulatedBoard:
@@ -175,6 +188,15 @@ class SimulatedBoard:
         del self.to_device[:LINK_IN]
         outputs = self.firmware.tick(self._counts, link)
         self.plant.advance(self.tick_s, self.pulses[:, 0], self.pulses[:, 1], self._pump, self._dump)
+        self._take(outputs)
+
+    def listen(self, phase_us: int) -> None:
+        """Between two ticks, `phase_us` after the last: the firmware answers what has come over the link."""
+        link = bytes(self.to_device[:LINK_IN])
+        del self.to_device[:LINK_IN]
+        self._take(self.firmware.listen(link, phase_us))
+
+    def _take(self, outputs: Outputs) -> None:
         self.from_device += outputs.link
         if outputs.pulses != self._decided:
             self._decided = outputs.pulses

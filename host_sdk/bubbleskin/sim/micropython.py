@@ -11,7 +11,7 @@ from types import ModuleType
 
 import bubble_firmware
 import bubble_protocol
-from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT
+from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY
 from bubbleskin.errors import LinkError
 from bubbleskin.interpreter import find_micropython
 from bubbleskin.sim.board import Outputs
@@ -59,7 +59,14 @@ class MicroPythonFirmware:
 
     def tick(self, counts: array, link: bytes) -> Outputs:
         """See `Firmware`."""
-        block = len(link).to_bytes(2, "little") + counts.tobytes() + link.ljust(LINK_IN, b"\0")
+        return self._exchange(len(link).to_bytes(2, "little") + counts.tobytes() + link.ljust(LINK_IN, b"\0"))
+
+    def listen(self, link: bytes, phase_us: int) -> Outputs:
+        """See `Firmware`."""
+        head = (len(link) | LISTEN_ONLY).to_bytes(2, "little") + phase_us.to_bytes(2, "little")
+        return self._exchange(head.ljust(2 + 2 * (self._n + 1), b"\0") + link.ljust(LINK_IN, b"\0"))
+
+    def _exchange(self, block: bytes) -> Outputs:
         try:
             assert self._process.stdin is not None
             self._process.stdin.write(block)
