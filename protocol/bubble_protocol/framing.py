@@ -56,15 +56,11 @@ def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
         start += 1
 
 
-if not COMPILED:  # CPython loops over bytes slowly, and searches and slices in C
+if not COMPILED:  # CPython loops over bytes slowly, but splits, joins and slices in C
+    _DISTANCES = [bytes((distance,)) for distance in range(1, 256)]
 
     def _stuff(frame, end):
-        at = 0
-        i = frame.find(_ZERO, 1, end + 1)
-        while i > 0:
-            frame[at] = i - at
-            at = i
-            i = frame.find(_ZERO, i + 1, end + 1)
+        frame[:end] = b"".join([_DISTANCES[len(run)] + run for run in frame[1:end].split(_ZERO)])
 
     def copy(source, start, end, target, at):
         """As above."""

@@ -9,6 +9,7 @@ All words are little-endian and blocks have a fixed size, the link's bytes at th
 import sys
 
 from bubble_firmware.app import LISTEN
+from bubble_protocol.framing import copy
 
 LINK_IN = 256
 LINK_OUT = 1024
@@ -85,18 +86,14 @@ class Hands:
         """Bytes that have come over the link."""
         block = self._in
         size = block[0] | block[1] << 8
-        for index in range(size):
-            buffer[index] = block[self._link_in + index]
+        copy(block, self._link_in, self._link_in + size, buffer, 0)
         return size
 
     def send(self, frame, length):
         """Queue a frame; False where it does not fit."""
         if self._sent + length > LINK_OUT:
             return False
-        out = self._out
-        at = self._link_out + self._sent
-        for index in range(length):
-            out[at + index] = frame[index]
+        copy(frame, 0, length, self._out, self._link_out + self._sent)
         self._sent += length
         return True
 

@@ -12,7 +12,7 @@ from rich.table import Table
 from bubbleskin.bench.rows import Row
 from bubbleskin.cli.options import as_json
 
-_PARTS = ("simulation", "membrane")
+_PARTS = ("simulation", "membrane", "codec", "link", "clock")
 
 
 @click.command()
@@ -21,7 +21,9 @@ _PARTS = ("simulation", "membrane")
 def bench(parts: tuple[str, ...], json: bool) -> None:
     """Measure speeds and print them beside their targets.
 
-    PART: simulation (how fast simulated wristbands run) or membrane (inversions, tables, fits). Without one, all.
+    PART: simulation (how fast simulated wristbands run), membrane (inversions, tables, fits), codec (frames, beside
+    pymavlink), link (round trips over a pseudo-terminal, beside a plain echo) or clock (error of the device's time
+    under jitter). Without one, all.
     """
     console = Console(stderr=json)
     rows: list[Row] = []

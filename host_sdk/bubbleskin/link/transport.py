@@ -2,6 +2,8 @@
 
 import contextlib
 import errno
+import os
+import select
 import time
 from typing import Any, Protocol
 
@@ -55,19 +57,26 @@ class SerialTransport:
             raise InvalidInput(f"{url} is not a port or URL that can be opened: {error}.") from None
         except (serial.SerialException, OSError) as error:
             raise LinkError(_why_not(url, error)) from None
+        self._waitable = None
+        if not self._negotiates and os.name == "posix":
+            with contextlib.suppress(OSError, AttributeError):
+                self._waitable = self._port.fileno()
 
     def read(self, timeout: float) -> bytes:
         """Wait up to `timeout` seconds for bytes; take all that are there."""
         try:
             if self._negotiates:
                 return self._read_polling(timeout)
+            if self._waitable is not None:  # each change of a port's timeout costs as much as the whole read
+                ready, _, _ = select.select([self._waitable], [], [], max(timeout, 0.0))
+                return bytes(self._port.read(4096)) if ready else b""
             self._port.timeout = max(timeout, 0.0)
             first = self._port.read(1)
             if not first:
                 return b""
             self._port.timeout = 0
             return bytes(first + self._port.read(4096))
-        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed under our feet
+        except (serial.SerialException, OSError, TypeError, ValueError) as error:  # the last two: closed under our feet
             raise LinkError(
                 f"The connection to {self.name} is lost ({error}). Check the cable and connect again."
             ) from None
@@ -98,6 +107,7 @@ class SerialTransport:
 
     def close(self) -> None:
         """Let go of the port."""
+        self._waitable = -1 if self._waitable is not None else None  # its number may soon be another file's
         left = getattr(self._port, "_socket", None)  # pyserial forgets to close it when the other end has gone
         with contextlib.suppress(serial.SerialException, OSError):
             self._port.close()
