@@ -298,6 +298,10 @@ class Skin:
         """
         return drive(self._skin.record(path, rate_hz, seconds, fields))
 
+    def synchronise(self, pings: int = PINGS) -> Clock:
+        """Send pings at once and return the clock, which knows the better for them."""
+        return drive(self._skin.synchronise(pings))
+
     @property
     def clock(self) -> Clock:
         """The device's clock: `now()`, `at(host_time)`, `offset`, `drift_ppm` and `uncertainty`; pings it if need be."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from bubbleskin.cli import bench, device, firmware, membrane, sim
+from bubbleskin.cli import bench, device, firmware, membrane, monitor, sim
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 
@@ -15,7 +15,14 @@ def bubbleskin() -> None:
     """Heights in, shapes out: wristbands of inflatable bubbles, real and simulated."""
 
 
-for _command in (*device.commands, *sim.commands, *membrane.commands, *bench.commands, *firmware.commands):
+for _command in (
+    *device.commands,
+    *monitor.commands,
+    *sim.commands,
+    *membrane.commands,
+    *bench.commands,
+    *firmware.commands,
+):
     bubbleskin.add_command(_command)
 
 
