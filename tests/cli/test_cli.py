@@ -162,3 +162,16 @@ def test_tables_go_to_the_wristband_and_come_back(run, tmp_path):
     wrong = run("table", "--board", "wristband19", "--bubbles", "19", "-o", mixed, "--upload", *SIM)
     assert wrong[0] == 2
     assert "this is a wristband7" in wrong[2]
+
+
+def test_monitor_records_what_it_shows(tmp_path, capsys):
+    path = tmp_path / "x.csv"
+    with pytest.raises(SystemExit) as ended:
+        main(["monitor", "--device", "sim://wristband7", "--seconds", "0.5", "--record", str(path)])
+    assert ended.value.code == 0
+    out = capsys.readouterr().out
+    assert "11 states are in" in out
+    assert "0 lost" in out
+    rows = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert len(rows) == 12
+    assert rows[0].startswith("time_s,mode,lost,supply_kpa,board_faults,height_mm_0")
