@@ -76,15 +76,12 @@ class Day:
     def watch(self) -> None:
         """Telemetry at some rate, with shows in between."""
         ends = self.board.time + 5.0
-        sequence = None
         for state in self.skin.telemetry(float(self.rng.choice([5, 20, 50]))):
-            if sequence is not None:
-                self.lost += state.time - sequence > 0.3
-            sequence = state.time
             self.telemetry += 1
             if self.rng.random() < 0.02:
                 self.skin.show(self.rng.uniform(5.0, 13.0, self.board.data.BUBBLES), wait=False)
             if state.time > ends:
+                self.lost += state.lost
                 break
 
     def fault(self) -> None:
