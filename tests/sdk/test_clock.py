@@ -135,3 +135,18 @@ def test_before_the_first_ping_nothing_is_said():
     for ask in (clock.now, lambda: clock.offset, lambda: clock.uncertainty, lambda: clock.drift_ppm):
         with pytest.raises(LinkError, match="no ping"):
             ask()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_drift_that_wanders_as_fast_as_is_allowed_contradicts_nothing(sign):
+    def truth(host):
+        return 50.0 + host + sign * WANDER * host**2 / 2
+
+    host = Host()
+    clock = Clock(TICK, host)
+    for k in range(900):
+        host.now = k / 10 + 2e-5
+        clock.observe(k / 10, host.now, *reading(truth(k / 10 + 1e-5)))
+    assert clock.pings >= 590, "nothing was taken for a reboot"
+    for later in (0.0, 10.0, 100.0, 600.0):
+        assert abs(clock.at(host.now + later) - truth(host.now + later)) <= clock.uncertainty_at(host.now + later)
