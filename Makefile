@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 GENERATORS := nominal_table golden_vectors protocol_page cli_page draw_demo draw_membrane_figures
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip check lint generated micropython bench generate clean
+.PHONY: help setup demo test chip check lint generated micropython bench day generate clean
 
 help: ## what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -52,6 +52,9 @@ micropython: setup ## build the real MicroPython that the tests run on, once
 
 bench: setup ## measure speeds
 	$(BIN)/bubbleskin bench
+
+day: setup micropython ## 24 virtual hours with faults and reconnects on MicroPython: counters and heap; most of an hour
+	$(BIN)/python tools/day.py
 
 clean: ## remove what setup and tests made here
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -18,11 +18,19 @@ from bubble_protocol import codec, framing, messages, version
 
 PATH = Path("tests/protocol/golden.json")
 
-FORMATS = {messages.U8: "B", messages.U16: "H", messages.U32: "I", messages.I32: "i", messages.TEXT: "16s"}
+FORMATS = {
+    messages.U8: "B",
+    messages.U16: "H",
+    messages.U32: "I",
+    messages.I16: "h",
+    messages.I32: "i",
+    messages.TEXT: "16s",
+}
 RANGES = {
     messages.U8: (0, 0xFF),
     messages.U16: (0, 0xFFFF),
     messages.U32: (0, 0xFFFFFFFF),
+    messages.I16: (-(1 << 15), (1 << 15) - 1),
     messages.I32: (-(1 << 31), (1 << 31) - 1),
 }
 TEXTS = {"least": "", "example": "wristband7", "greatest": "~" * 16}

@@ -76,13 +76,19 @@ another number after every boot, so that a host notices when the wristband has f
 
 ## Time
 
-The wristband counts ticks of `tick_us` since it booted; `ticks` in a reply is the tick in which it was made. PING's
-reply also has the time since that tick began: device time in µs is `ticks` × `tick_us` + `phase_us`.
+The wristband counts ticks of `tick_us` since it booted, and begins again after 2³⁰ of them, 62 days; `ticks` in a reply
+is the tick in which it was made. PING's reply also has the time since that tick began: device time in µs is
+`ticks` × `tick_us` + `phase_us`.
 
 ## Telemetry
 
 SUBSCRIBE asks for one TELEMETRY every so many ticks, with the fields of STATE's reply. Its sequence number counts the
 messages that were due, not those that found room: a gap is a loss, which INFO counts as well. HELLO ends a subscription.
+
+SUBSCRIBE_FIELDS chooses columns by bits, so that less can be sent more often. TELEMETRY_FIELDS then has one signed value
+per bubble and column. Each of the two requests ends what the other began.
+
+{columns}
 
 ## Tables
 
@@ -171,6 +177,13 @@ def page() -> str:
         low=steps.TOLERANCE_MIN_UM,
         high=steps.TOLERANCE_MAX_UM,
         depth=steps.DEPTH_MAX,
+        columns=table(
+            ("bit", "name", "one is", "meaning"),
+            [
+                (bit, f"`{name}`", f"{size} {unit}".strip() if unit else "", meaning)
+                for bit, name, unit, size, meaning in messages.COLUMNS
+            ],
+        ).rstrip(),
         errors=enumeration(messages.ERRORS, "error").rstrip(),
     )
     parts = [head]

@@ -2,7 +2,8 @@
 
 `hands` is the board's hardware, or what stands in for it:
 
-    wait() -> periods           until the next period has begun; how many have, 0: there will be no more
+    wait() -> periods           until the next period has begun; how many have, 0: there will be no more, LISTEN: none yet,
+                                but there is time for a look at the link
     sense(counts)               fill in one count per bubble, then the supply's; 0xFFFF where no chip answers
     act(pulses, pump, dump)     outputs of the next period: fill and vent µs per bubble, pump 0 to 65535
     vent()                      the safe outputs, at once: fill closed, vent open, pump off
@@ -38,6 +39,10 @@ from bubble_firmware.ticks import bins, count
 from bubble_protocol.messages import ACTIVE, EXCEPTION, HOLDING, SELF_TEST, SUPPLY_LOST, VENTED, VENTING
 
 _TIDY_MASK = 1023  # ticks
+_TICKS_MASK = (1 << 30) - 1  # more, and counting allocates: ticks begin again after 62 days
+
+
+LISTEN = -1
 
 
 class App:
@@ -47,7 +52,7 @@ class App:
         gc.collect()  # or what imports have left behind splits the heap where the bubbles' state is to go in one piece
         self.board = board
         self.hands = hands
-        self.ticks = 0
+        self.ticks = -1  # the first is 0
         self.mode = VENTED
         self.faults = hands.boot_faults
         self.exceptions = 0
@@ -71,6 +76,7 @@ class App:
 
     def tick(self):
         """One period. Whatever goes wrong in it, the outputs go to vent and the next one is tried."""
+        self.ticks = self.ticks + 1 & _TICKS_MASK
         try:
             self._control()
         except Exception:
@@ -80,7 +86,14 @@ class App:
         except Exception:
             self._fail()
             self.session.fail()
-        self.ticks += 1
+
+    def listen(self):
+        """Between two ticks, when there is time: answer what has come over the link."""
+        try:
+            self.session.listen()
+        except Exception:
+            self._fail()
+            self.session.fail()
 
     def _control(self):
         hands = self.hands
@@ -172,7 +185,10 @@ def run(app):
     """Tick for as long as the hands' clock does."""
     while True:
         periods = app.hands.wait()
-        if not periods:
+        if periods > 0:
+            app.ticks += periods - 1
+            app.tick()
+        elif periods:
+            app.listen()
+        else:
             return
-        app.ticks += periods - 1
-        app.tick()

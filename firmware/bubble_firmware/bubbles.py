@@ -148,3 +148,8 @@ class Bubbles:
     def report(self, values, at):
         """Put the repeated fields of STATE at `values[at:]`."""
         control.gather(self._rows, values, at, self.count)
+
+    def pick(self, values, plan, at, columns):
+        """Put chosen words of every bubble's row at `values[at:]`, see `control.pick`; returns how many."""
+        control.pick(self._rows, values, plan, at, columns, self.count)
+        return columns * self.count

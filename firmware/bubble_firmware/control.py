@@ -455,6 +455,19 @@ def gather(s: ptr32, v: ptr32, at: int, n: int):
 
 
 @micropython.viper
+def pick(s: ptr32, v: ptr32, plan: ptr32, at: int, columns: int, n: int):
+    """Copy the words of every row that `plan` names, shifted right by what stands 8 words after each name."""
+    while n > 0:
+        i = 0
+        while i < columns:
+            v[at] = s[plan[i]] >> plan[i + 8]
+            at += 1
+            i += 1
+        s = ptr32(uint(s) + 4 * ROW)
+        n -= 1
+
+
+@micropython.viper
 def aim(s: ptr32, v: ptr32, at: int, n: int):
     """Begin every bubble's way from where it is to the height (µm) in `values[at:]`."""
     while n > 0:

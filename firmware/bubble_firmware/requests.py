@@ -50,7 +50,7 @@ class Requests:
         values[3] = app.exceptions
         values[4] = self._decoder.good
         values[5] = self._decoder.bad
-        values[6] = self.telemetry_dropped
+        values[6] = self._telemetry.dropped
         if app.mode == VENTED:  # counting takes longer than a tick
             app.hands.slack()
             self._heap_free = heap_free()

@@ -8,6 +8,7 @@ from array import array
 
 from bubble_firmware import delivery
 from bubble_firmware.requests import NO_ELEMENT, Requests
+from bubble_firmware.telemetry import Telemetry
 from bubble_protocol import codec, framing, messages
 from bubble_protocol.crc import crc32_into, crc32_word
 from bubble_protocol.portable import const, heap_free
@@ -37,12 +38,9 @@ class Session(Requests):
         self._ordered = False  # whether its reply is kept
         self._budget = 0
         self._owed = 0  # how many of the last replies have found no room yet
-        self._period = 0  # telemetry, ticks; 0: none
-        self._wait = 0
-        self._telemetry_sequence = 0
-        self.telemetry_dropped = 0
+        self._telemetry = Telemetry(app)
         self.heard = 0  # frames of the open session since boot, modulo 65536: the host is alive
-        self.capabilities = messages.DELIVERY
+        self.capabilities = messages.DELIVERY | messages.CAN_CHOOSE_TELEMETRY
         self._heap_free = heap_free()
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
@@ -52,6 +50,7 @@ class Session(Requests):
         self._requests = self._handlers()
         self._requests[messages.HELLO] = self._hello
         self._requests[messages.SUBSCRIBE] = self._subscribe
+        self._requests[messages.SUBSCRIBE_FIELDS] = self._subscribe_fields
         self._slow = {messages.TABLE_WRITE, messages.TABLE_COMMIT, messages.TABLE_READ, messages.TICKS}
 
     def serve(self, handlers):
@@ -59,7 +58,13 @@ class Session(Requests):
         self._requests.update(handlers)
 
     def poll(self):
-        """Handle what has come since the last tick; send telemetry when it is due."""
+        """Once a tick: handle what has come; send telemetry when it is due."""
+        self.listen()
+        if self._telemetry.is_due():
+            self._tell()
+
+    def listen(self):
+        """Handle what has come."""
         if self._owed:
             self._pay()
         chunk = self._chunk
@@ -77,11 +82,6 @@ class Session(Requests):
             if not length:
                 break
             self._apply(kept.slot(), length)
-        if self._period:
-            self._wait -= 1
-            if self._wait <= 0:
-                self._wait = self._period
-                self._telemetry()
 
     def send_unasked(self, message_id, sequence, count):
         """Send the message whose fields stand in `_values`; whether there was room."""
@@ -205,7 +205,7 @@ class Session(Requests):
             return
         if opened == delivery.OPENED:
             self._owed = 0
-            self._period = 0  # a new host has not subscribed
+            self._telemetry.subscribe(0, 0)  # a new host has not subscribed
         self.heard = (self.heard + 1) & 0xFFFF
         values[0] = PROTOCOL_MIN
         values[1] = PROTOCOL_MAX
@@ -225,9 +225,15 @@ class Session(Requests):
         self._reply(0)
 
     def _subscribe(self, count):
-        self._period = self._wait = self._values[0]
-        self._telemetry_sequence = 0
+        self._telemetry.subscribe(self._values[0], 0)
         self._acknowledge()
+
+    def _subscribe_fields(self, count):
+        telemetry = self._telemetry
+        if telemetry.subscribe(self._values[0], self._values[1]):
+            self._acknowledge()
+        else:  # the limit is one of how many, not of which
+            self._refuse(messages.OUT_OF_RANGE, 1, NO_ELEMENT, self._values[1], 1, (1 << telemetry.most) - 1)
 
     # Sending.
 
@@ -272,14 +278,14 @@ class Session(Requests):
                 return
             self._owed -= 1
 
-    def _telemetry(self):
-        self._telemetry_sequence = (self._telemetry_sequence + 1) & 0xFFFF
+    def _tell(self):
+        telemetry = self._telemetry
         if self._owed:  # a reply comes first
-            self.telemetry_dropped += 1
+            telemetry.drop()
             return
-        length = self._pack(self._frame, messages.TELEMETRY, self._telemetry_sequence, self._fill_state())
+        length = self._pack(self._frame, telemetry.message_id, telemetry.sequence, telemetry.fill(self._values))
         if not self._app.hands.send(self._frame, length):
-            self.telemetry_dropped += 1
+            telemetry.drop()
 
     def _pack(self, frame, message_id, sequence, count):
         end = codec.BY_ID[message_id].pack(self._values, count, frame, _PAYLOAD_AT)

@@ -16,6 +16,26 @@ _SELF_TESTS = {number: name for number, name, _ in messages.SELF_TESTS}
 _TRANSLATED = {"mode", "board_faults", "self_test", "untrue_zero", "unfilled", "unvented", "store"}
 
 
+def mode_name(number: int) -> str:
+    """What the board does."""
+    return _MODES.get(number, "unknown")
+
+
+def status_name(number: int) -> str:
+    """What a bubble does."""
+    return _STATUSES.get(number, "unknown")
+
+
+def fault_names(bits: int) -> tuple[str, ...]:
+    """Faults of a bubble."""
+    return tuple(name for bit, name, _ in messages.FAULTS if bits & bit)
+
+
+def board_fault_names(bits: int) -> tuple[str, ...]:
+    """Faults of the board."""
+    return tuple(name for bit, name, _ in messages.BOARD_FAULTS if bits & bit)
+
+
 def _bits(mask: int) -> tuple[int, ...]:
     return tuple(bit for bit in range(32) if mask >> bit & 1)
 
@@ -103,8 +123,8 @@ class Health:
             time=reply["ticks"] * tick,
             tick_worst=reply["tick_worst_us"] * 1e-6,
             supply_kpa=reply["supply_pa"] / 1000,
-            mode=_MODES.get(reply["mode"], "unknown"),
-            board_faults=tuple(name for bit, name, _ in messages.BOARD_FAULTS if reply["board_faults"] & bit),
+            mode=mode_name(reply["mode"]),
+            board_faults=board_fault_names(reply["board_faults"]),
             self_test=_SELF_TESTS.get(reply["self_test"], "unknown"),
             untrue_zero=_bits(reply["untrue_zero"]),
             unfilled=_bits(reply["unfilled"]),
@@ -149,21 +169,31 @@ class State:
     status: tuple[str, ...]
     """resting, moving, settled, stopped or fault."""
     faults: tuple[tuple[str, ...], ...]
+    # Only telemetry with chosen fields has these; elsewhere they are None or NaN.
+    setpoint_mm: NDArray[np.float64] | None = None
+    """Where the way to the target stands."""
+    fill_ms: NDArray[np.float64] | None = None
+    """For how long the fill valve is energised in this tick."""
+    vent_ms: NDArray[np.float64] | None = None
+    supply_kpa: float = float("nan")
+    """The reservoir's gauge pressure."""
+    board_faults: tuple[str, ...] = ()
+    lost: int = 0
+    """Telemetry that was due since it was asked for and has not come."""
 
     @classmethod
-    def of(cls, message: Received, tick: float) -> Self:
+    def of(cls, message: Received, tick: float, lost: int = 0) -> Self:
         """From the reply to STATE, or from TELEMETRY."""
         columns = message.columns
         return cls(
             time=message["ticks"] * tick,
-            mode=_MODES.get(message["mode"], "unknown"),
+            mode=mode_name(message["mode"]),
             height_mm=columns["height_um"] / 1000,
             pressure_kpa=columns["pressure_pa"] / 1000,
             target_mm=columns["target_um"] / 1000,
-            status=tuple(_STATUSES.get(status, "unknown") for status in columns["status"].tolist()),
-            faults=tuple(
-                tuple(name for bit, name, _ in messages.FAULTS if faults & bit) for faults in columns["faults"].tolist()
-            ),
+            status=tuple(status_name(status) for status in columns["status"].tolist()),
+            faults=tuple(fault_names(faults) for faults in columns["faults"].tolist()),
+            lost=lost,
         )
 
     @property

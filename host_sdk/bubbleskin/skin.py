@@ -1,24 +1,27 @@
 """What a script holds: one wristband, real or simulated. `AsyncSkin` does the work, `Skin` runs it without an event loop."""
 
-import asyncio
-import contextlib
-from collections.abc import AsyncGenerator, Iterator, Sequence
+import os
+from collections.abc import AsyncGenerator, Iterable, Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from bubble_protocol import messages
-from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput, LinkError
+from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.layout import Layout
+from bubbleskin.link.clock import Clock
+from bubbleskin.link.pings import PINGS, ping
 from bubbleskin.link.session import Link, drive
 from bubbleskin.link.transport import Transport
 from bubbleskin.link.wire import Received, crc32
 from bubbleskin.playing import Played, Player, Playing, Progress
+from bubbleskin.recording import Recording
 from bubbleskin.records import Health, Info, State, TickHistogram
 from bubbleskin.shape.heightfield import Heights, sample
 from bubbleskin.shape.sequence import Playable
 from bubbleskin.stored import Figures, StoreInfo
+from bubbleskin.telemetry import Telemetry
 
 if TYPE_CHECKING:
     from bubbleskin.physics.calibration import Calibration
@@ -29,6 +32,8 @@ SETTLE = 3.0
 """Seconds beyond `over` after which `show` gives up waiting; the valves need about half of one."""
 
 _POLL = 0.02
+_CLOCK_AGE = 1.0
+"""Seconds after which the clock wants new pings."""
 _KNOTS_PER_MESSAGE = 48
 _TOGETHER = 8
 OVER_MAX = 60.0
@@ -42,9 +47,12 @@ class AsyncSkin:
         self.info = info
         self.layout = layout
         self.simulated = simulated
-        self._telemetry = 0  # number of the newest telemetry iterator
         link.on_open = self._opened
         self._player = Player(link, info, layout)
+        self._telemetry = Telemetry(link, info)
+        self.clock = Clock(info.tick, link.transport.now)
+        """The device's time, from the pings so far; `synchronise` sends some."""
+        link.on_ping = self.clock.hear
 
     @classmethod
     async def open(
@@ -121,35 +129,24 @@ class AsyncSkin:
             raise InvalidInput(f"A wristband cannot restart into {into!r}; choose one of {', '.join(numbers)}.")
         await self._link.call("RESTART", (numbers[into],))
 
-    async def telemetry(self, rate_hz: float = 20) -> AsyncGenerator[State]:
+    def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> AsyncGenerator[State]:
         """See `Skin.telemetry`."""
-        highest = 1 / self.info.tick
-        if not 0 < rate_hz <= highest:
-            raise InvalidInput(
-                f"rate_hz is {rate_hz}; telemetry comes more than 0 and up to {highest:g} times a second."
-            )
-        period = max(1, round(highest / rate_hz))
-        link = self._link
-        self._telemetry = mine = self._telemetry + 1
-        link.telemetry.clear()
-        patience = period * self.info.tick + link.timeout
-        try:
-            await link.call("SUBSCRIBE", (period,))
-            while True:
-                await link.wait(
-                    link.transport.now() + patience, lambda: bool(link.telemetry) or mine != self._telemetry
-                )
-                if mine != self._telemetry:
-                    return
-                if link.telemetry:
-                    yield State.of(link.telemetry.popleft(), self.info.tick)
-                else:
-                    await link.call("SUBSCRIBE", (period,))  # forgotten there, or nobody is there: then this says so
-        except (GeneratorExit, asyncio.CancelledError):
-            if mine == self._telemetry:
-                with contextlib.suppress(LinkError):
-                    await link.call("SUBSCRIBE", (0,))
-            raise
+        return self._telemetry.states(rate_hz, fields)
+
+    async def record(
+        self,
+        path: str | os.PathLike[str],
+        rate_hz: float = 20,
+        seconds: float | None = None,
+        fields: Iterable[str] | None = None,
+    ) -> Recording:
+        """See `Skin.record`."""
+        return await self._telemetry.record(path, self.layout, rate_hz, seconds, fields)
+
+    async def synchronise(self, pings: int = PINGS) -> Clock:
+        """Send pings at once, for the clock to begin with; returns it."""
+        await ping(self._link, self.clock, pings)
+        return self.clock
 
     async def play(
         self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress = lambda playing: None
@@ -257,7 +254,10 @@ class AsyncSkin:
 
     async def aclose(self) -> None:
         """Let go of the device. It keeps its shape; `vent` first to leave it flat."""
-        await self._link.close()
+        try:
+            await self._telemetry.aclose()
+        finally:
+            await self._link.close()
 
     async def __aenter__(self) -> Self:
         return self
@@ -320,12 +320,15 @@ class Skin:
         """Vent and start again, into the `firmware`, the `boot_loader` or MicroPython's `prompt`; then connect anew."""
         drive(self._skin.restart(into))
 
-    def telemetry(self, rate_hz: float = 20) -> Iterator[State]:
+    def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> Iterator[State]:
         """States as the device sends them, without end; close the iterator or leave the loop to end it.
 
-        There is one telemetry at a time: a new one ends the one before it.
+        There is one telemetry at a time: a new one ends the one before it. `fields` chooses what is sent, so that more
+        fits through the link: among height, pressure, target, status, faults, setpoint, fill and vent; the supply's
+        pressure and the board's faults come with it. None sends what `state` has. `State.lost` counts what was due
+        and has not come.
         """
-        states = self._skin.telemetry(rate_hz)
+        states = self._skin.telemetry(rate_hz, fields)
         try:
             while True:
                 yield drive(_next(states))
@@ -358,6 +361,33 @@ class Skin:
     def resume(self) -> None:
         """Go on with a sequence that was paused, from where it was."""
         drive(self._skin.resume())
+
+    def record(
+        self,
+        path: str | os.PathLike[str],
+        rate_hz: float = 20,
+        seconds: float | None = None,
+        fields: Iterable[str] | None = None,
+    ) -> Recording:
+        """Record telemetry to a .csv or .parquet file: for `seconds`, or while a `with` block runs.
+
+        What comes while the script shows, waits or asks goes to the file; a script that does none of these reads
+        nothing. `pandas.read_csv(path, comment="#")` and `pandas.read_parquet(path)` read it: a row per state, a column
+        per bubble and quantity. A program that is killed leaves all rows so far, in Parquet's case in
+        `NAME.partial.csv`. Parquet needs the extra `bubbleskin[parquet]`.
+        """
+        return drive(self._skin.record(path, rate_hz, seconds, fields))
+
+    def synchronise(self, pings: int = PINGS) -> Clock:
+        """Send pings at once and return the clock, which knows the better for them."""
+        return drive(self._skin.synchronise(pings))
+
+    @property
+    def clock(self) -> Clock:
+        """The device's clock: `now()`, `at(host_time)`, `offset`, `drift_ppm` and `uncertainty`; pings it if need be."""
+        if self._skin.clock.age > _CLOCK_AGE:
+            drive(self._skin.synchronise())
+        return self._skin.clock
 
     def stop(self) -> None:
         """Close all valves and keep the air, until the next `show` or `play`; ends a sequence."""

@@ -14,7 +14,7 @@ Nothing here allocates once made, reads a clock or does I/O. `crc32_into(buffer,
 the caller's: crcmod on the host, `bubble_protocol.crc` on the device.
 """
 
-from bubble_protocol.portable import const, micropython, ptr8
+from bubble_protocol.portable import COMPILED, const, micropython, ptr8
 
 HEADER = 3  # id, sequence number
 CRC = 4
@@ -88,6 +88,17 @@ def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
         target[at] = source[start]
         at += 1
         start += 1
+
+
+if not COMPILED:  # CPython loops over bytes slowly, but splits, joins and slices in C
+    _DISTANCES = [bytes((distance,)) for distance in range(1, 256)]
+
+    def _stuff(frame, end):
+        frame[:end] = b"".join([_DISTANCES[len(run)] + run for run in frame[1:end].split(_ZERO)])
+
+    def copy(source, start, end, target, at):
+        """As above."""
+        target[at : at + end - start] = source[start:end]
 
 
 def seal(frame, length, crc32_into, key=NO_KEY):

@@ -6,9 +6,9 @@ the request's id plus REPLY. All numbers are little-endian. Fields are only ever
 """
 
 # Kinds: the low bits are the size in bytes, the top bit says signed. TEXT is 16 bytes of ASCII, zero padded.
-U8, U16, U32, I32 = 0x01, 0x02, 0x04, 0x84
+U8, U16, U32, I16, I32 = 0x01, 0x02, 0x04, 0x82, 0x84
 TEXT = 0x10
-KIND_NAMES = {U8: "u8", U16: "u16", U32: "u32", I32: "i32", TEXT: "text16"}
+KIND_NAMES = {U8: "u8", U16: "u16", U32: "u32", I16: "i16", I32: "i32", TEXT: "text16"}
 
 REPLY = 0x80
 
@@ -18,6 +18,7 @@ TICKS, RESTART = 0x0E, 0x0F
 STORE_SAVE, STORE_INFO, STORE_RESET, FIGURES_WRITE, FIGURES_READ = 0x16, 0x17, 0x18, 0x19, 0x1A
 SEQUENCE_BEGIN, SEQUENCE_WRITE, SEQUENCE_ARM, SEQUENCE_START = 0x20, 0x21, 0x22, 0x23
 SEQUENCE_CONTROL, SEQUENCE_STATE, SEQUENCE_EVENT = 0x24, 0x25, 0x26
+SUBSCRIBE_FIELDS, TELEMETRY_FIELDS = 0x1B, 0x1C
 ERROR = 0x7F
 
 # What ERROR says went wrong.
@@ -70,11 +71,12 @@ ERRORS = (
 )
 
 # Bits of `capabilities`.
-DELIVERY, STORE, CAN_SEQUENCES = 1, 4, 8
+DELIVERY, STORE, CAN_SEQUENCES, CAN_CHOOSE_TELEMETRY = 1, 4, 8, 16
 CAPABILITIES = (
     (DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),
     (STORE, "store", "tables, settings and figures can be stored"),
     (CAN_SEQUENCES, "sequences", "sequences are played on the device's own clock"),
+    (CAN_CHOOSE_TELEMETRY, "telemetry_fields", "SUBSCRIBE_FIELDS: telemetry of chosen columns"),
 )
 
 # What the board as a whole is doing.
@@ -198,6 +200,18 @@ SEQUENCE_ACTIONS = (
     (PAUSE, "pause", "let its time and the setpoints stand still"),
     (RESUME, "resume", "go on from there"),
     (END, "end", "end it as STOP does"),
+)
+
+# What SUBSCRIBE_FIELDS can choose of every bubble, as bits: name, unit, how many of the unit one stands for, meaning.
+COLUMNS = (
+    (1, "height", "µm", 1, "estimated height"),
+    (2, "pressure", "Pa", 4, "gauge pressure at the sensor"),
+    (4, "target", "µm", 1, "height asked"),
+    (8, "status", "", 1, "see bubble status"),
+    (16, "faults", "", 1, "see faults, bits"),
+    (32, "setpoint", "µm", 1, "where the way to the target stands now"),
+    (64, "fill", "µs", 1, "how long the fill valve is energised in this period"),
+    (128, "vent", "µs", 1, "the same of the vent valve"),
 )
 
 _TICKS = ("ticks", U32, "ticks", None, None, "device time: ticks since boot")
@@ -554,6 +568,31 @@ MESSAGES = (
         ),
         (),
         "unasked: something has happened to the sequence, at this tick; the sequence number counts, so a gap is a loss",
+    ),
+    (
+        SUBSCRIBE_FIELDS,
+        "SUBSCRIBE_FIELDS",
+        (
+            ("period_ticks", U16, "ticks", 0, 60000, "one TELEMETRY_FIELDS every so many ticks; 0: none"),
+            ("fields", U16, "", 1, 255, "see telemetry columns, bits; as many as a frame has room for"),
+        ),
+        (),
+        "send chosen telemetry in place of what was subscribed to before",
+    ),
+    (SUBSCRIBE_FIELDS | REPLY, "SUBSCRIBE_FIELDS_REPLY", (_TICKS,), (), "subscription changed"),
+    (
+        TELEMETRY_FIELDS,
+        "TELEMETRY_FIELDS",
+        (
+            _TICKS,
+            ("mode", U8, "", None, None, "see mode"),
+            ("board_faults", U8, "", None, None, "see board faults, bits"),
+            ("supply_pa", I32, "Pa", None, None, "gauge pressure of the reservoir"),
+            ("dropped", U16, "frames", None, None, "telemetry that found no room since it was subscribed to"),
+            ("fields", U16, "", None, None, "the columns, bits"),
+        ),
+        (("value", I16, "", None, None, "per bubble one value for each bit of fields, lowest bit first"),),
+        "unasked: the columns chosen; the sequence number counts what was due, so a gap is a loss",
     ),
     (
         ERROR,

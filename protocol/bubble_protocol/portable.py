@@ -14,12 +14,14 @@ try:
     from micropython import const
 
     ptr8 = ptr16 = ptr32 = uint = None
+    COMPILED = True
 
     def heap_free():
         """Free bytes of the garbage collected heap."""
         return gc.mem_free()  # type: ignore[attr-defined]
 
 except ImportError:
+    COMPILED = False
 
     class micropython:  # type: ignore[no-redef]  # noqa: N801
         """The decorators that the device's compiler knows, as plain functions."""
@@ -32,7 +34,7 @@ except ImportError:
             for name in code.co_varnames[: code.co_argcount]:
                 kind = function.__annotations__.get(name)
                 casts.append(kind if kind in (ptr8, ptr16, ptr32) else None)
-            if not any(casts):
+            if ptr16 not in casts:  # the others are the buffer itself
                 return function
 
             def called(*arguments):

@@ -216,3 +216,16 @@ def test_ctrl_c_stops_and_vents(run, monkeypatch):
     code, _, err = run("play", "pulse", *SIM)
     assert (code, err.strip()) == (130, "Stopped.")
     assert done == ["stop", "vent"]
+
+
+def test_monitor_records_what_it_shows(tmp_path, capsys):
+    path = tmp_path / "x.csv"
+    with pytest.raises(SystemExit) as ended:
+        main(["monitor", "--device", "sim://wristband7", "--seconds", "0.5", "--record", str(path)])
+    assert ended.value.code == 0
+    out = capsys.readouterr().out
+    assert "11 states are in" in out
+    assert "0 lost" in out
+    rows = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert len(rows) == 12
+    assert rows[0].startswith("time_s,mode,lost,supply_kpa,board_faults,height_mm_0")

@@ -17,7 +17,7 @@ from bubble_firmware.app import App
 from bubble_firmware.drivers.flash import Memory
 
 class Hands:
-    # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick.
+    # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick and between ticks.
     boot_id = 1
     late_ticks = 0
     alarms = boot_faults = 0
@@ -107,6 +107,7 @@ def ticks(app, count):
         count -= 1
         micropython.heap_lock()
         app.tick()
+        app.listen()
         micropython.heap_unlock()
 
 def measure(app, hands):
@@ -146,6 +147,7 @@ SEQUENCES = [
     pytest.param(ACTIVE, id="active"),
     pytest.param(("SHOW up", "HELLO", "STOP", "SHOW down", "VENT", "CLEAR", "TABLE_READ"), id="everything"),
     pytest.param(("SHOW up", "garbage", "too high", "wrong count", "wrong length", "unknown"), id="refused"),
+    pytest.param(("SUBSCRIBE_FIELDS", "SHOW up", "PING", "SHOW down", "INFO"), id="telemetry columns"),
     pytest.param(("TABLE_WRITE", "SHOW up", "STATE"), id="tables"),
     pytest.param(OUT_OF_ORDER, id="out of order, twice, overtaken"),
     pytest.param(("STORE_INFO", "FIGURES_READ", "SHOW up", "STORE_SAVE", "FIGURES_WRITE"), id="store"),
@@ -176,6 +178,7 @@ def request(name, n, number, session):
         "PING": lambda: of("PING", (0xFEDCBA98,)),
         "HELLO": lambda: of("HELLO", (2, 2, session)),
         "SUBSCRIBE": lambda: of("SUBSCRIBE", (20000 // boards.load(f"wristband{n}").TICK_US,)),  # 50 Hz
+        "SUBSCRIBE_FIELDS": lambda: of("SUBSCRIBE_FIELDS", (2, 0b11100111 if n == 7 else 0b11100011)),
         "TABLE_READ": lambda: of("TABLE_READ", (1, 10)),
         "TABLE_WRITE": lambda: of("TABLE_WRITE", (1, 4, 60), [(9000, 65535)] * 40),
         "FIGURES_WRITE": lambda: of("FIGURES_WRITE", (), [(170, 1100, 900, 4000)] * n),
@@ -247,7 +250,7 @@ def test_the_tick_allocates_nothing(micropython, board, sequence):
     requests = b"".join(rounds(sequence, n))
     ticks = 600 if sequence == SAVING else 4000
     said, wear, failing = micropython(
-        SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=17, ticks=ticks)
+        SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=9, ticks=ticks)
     ).splitlines()
     grown, exceptions, good, sent, fills, vents, rests, events = map(int, said.split())
     assert exceptions == 0, "MemoryError while the heap was locked"

@@ -113,7 +113,7 @@ def test_hello_introduces_the_board(rig):
         "height_max_um": board.HEIGHT_MAX_UM,
         "pressure_max_pa": board.PRESSURE_MAX_PA,
         "window": 8,
-        "capabilities": messages.DELIVERY | messages.STORE | messages.CAN_SEQUENCES,
+        "capabilities": sum(bit for bit, _, _ in messages.CAPABILITIES),
         "tables_crc": zlib.crc32(np.array(nominal.KNOTS, "<u2").tobytes() * board.BUBBLES),
     }
 
@@ -172,6 +172,77 @@ def test_telemetry_comes_in_its_period_and_counts_what_was_due(rig7):
     assert rig7.ask("INFO")["telemetry_dropped"] == 3
     rig7.tick(50)
     assert rig7.heard() == []
+
+
+@pytest.mark.parametrize("fields", [1, 2, 0b101, 0b11001, 0b11100110, 0b111111])
+def test_chosen_columns_say_the_same_as_the_state_of_that_tick(rig, fields):
+    rig.show(*[9000 + 100 * bubble for bubble in range(rig.board.BUBBLES)], over_ms=1000)
+    rig.sense(2, 12345)
+    rig.hands.to_device += rig.encode("SUBSCRIBE_FIELDS", rig.next_sequence(messages.SUBSCRIBE_FIELDS), (1, fields))
+    rig.tick(8)
+    rig.hands.to_device += rig.encode("STATE", rig.next_sequence(messages.STATE))
+    rig.heard()
+    rig.tick()
+    state, sample = rig.heard()
+    assert (state.id, sample.id) == (messages.STATE | messages.REPLY, messages.TELEMETRY_FIELDS)
+    assert (sample["ticks"], sample["mode"], sample["fields"]) == (state["ticks"], state["mode"], fields)
+    assert (sample["dropped"], sample["board_faults"]) == (0, 0)
+    assert abs(sample["supply_pa"] - rig.board.SUPPLY_PA) < 100
+    chosen = [column for column in messages.COLUMNS if column[0] & fields]
+    rows = sample.columns["value"].reshape(rig.board.BUBBLES, len(chosen))
+    told = {
+        "height": "height_um",
+        "pressure": "pressure_pa",
+        "target": "target_um",
+        "status": "status",
+        "faults": "faults",
+    }
+    for column, (_, name, _, size, _) in zip(rows.T, chosen, strict=True):
+        if name in told:
+            assert column.tolist() == (state.columns[told[name]] // size).tolist()
+        elif name == "setpoint":
+            heights = state.columns["height_um"]
+            assert (column >= rig.board.HEIGHT_REST_UM).all()
+            assert (column <= heights.max() + 4000).all()
+        else:
+            assert column.tolist() == [rig.pulse(bubble)[name == "vent"] for bubble in range(rig.board.BUBBLES)]
+
+
+def test_the_columns_of_telemetry_are_of_the_row_they_name(rig7):
+    """Target, fill and vent from what the hands were told; a gap counted by the device too."""
+    rig7.show(12000)
+    rig7.ask("SUBSCRIBE_FIELDS", (2, 4))
+    rig7.tick(4)
+    assert {tuple(sample.columns["value"]) for sample in rig7.heard()} == {(12000,) * 7}
+    rig7.hands.full = True
+    rig7.tick(6)
+    rig7.hands.full = False
+    rig7.tick(2)
+    (sample,) = rig7.heard()
+    assert sample["dropped"] == 3
+    rig7.ask("SUBSCRIBE_FIELDS", (0, 1))
+    assert rig7.ask("INFO")["telemetry_dropped"] == 3
+    rig7.ask("SUBSCRIBE", (2,))
+    rig7.tick(4)
+    assert {sample.id for sample in rig7.heard()} == {messages.TELEMETRY}
+    rig7.ask("SUBSCRIBE_FIELDS", (0, 1))
+    rig7.tick(10)
+    assert rig7.heard() == []
+
+
+@pytest.mark.usefixtures("unchanged")
+def test_more_columns_than_a_frame_has_room_for_are_refused(rig):
+    assert rig.refused("SUBSCRIBE_FIELDS", (4, 0))[:2] == (messages.OUT_OF_RANGE, 1)
+    assert rig.refused("SUBSCRIBE_FIELDS", (4, 256))[:2] == (messages.OUT_OF_RANGE, 1)
+    if rig.board.BUBBLES == 19:
+        assert rig.refused("SUBSCRIBE_FIELDS", (4, 127))[:4] == (messages.OUT_OF_RANGE, 1, WHOLE, 127)
+    else:
+        assert rig.ask("SUBSCRIBE_FIELDS", (0, 255)).id == messages.SUBSCRIBE_FIELDS | messages.REPLY
+
+
+def test_ticks_begin_again_before_they_would_allocate(rig7):
+    rig7.app.ticks = (1 << 30) - 3
+    assert [rig7.ask("PING", (1,))["ticks"] for _ in range(4)] == [(1 << 30) - 2, (1 << 30) - 1, 0, 1]
 
 
 def test_a_new_host_has_not_subscribed(rig7):

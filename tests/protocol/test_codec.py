@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 from bubble_protocol import codec, messages
 from bubble_protocol.framing import PAYLOAD_MAX
 
-FORMATS = {messages.U8: "B", messages.U16: "H", messages.U32: "I", messages.I32: "i", messages.TEXT: "16B"}
+FORMATS = {
+    messages.U8: "B",
+    messages.U16: "H",
+    messages.U32: "I",
+    messages.I16: "h",
+    messages.I32: "i",
+    messages.TEXT: "16B",
+}
 every_message = pytest.mark.parametrize("message", codec.BY_ID.values(), ids=lambda message: message.name)
 
 
@@ -28,7 +35,7 @@ def extremes(kind):
     bits = 8 * (kind & 15)
     ends = (
         [-(1 << bits - 1), -1, 0, 1, (1 << bits - 1) - 1]
-        if kind == messages.I32
+        if kind in (messages.I16, messages.I32)
         else [0, 1, 1 << bits - 1, (1 << bits) - 1]
     )
     return st.one_of(st.sampled_from(ends), st.integers(ends[0], ends[-1]))

@@ -6,12 +6,18 @@ from bubble_firmware import boards
 from bubble_firmware.requests import _KNOTS_PER_MESSAGE
 from bubble_protocol import codec, messages, steps
 from bubble_protocol.framing import PAYLOAD_MAX
-from bubble_protocol.messages import I32, MESSAGES, REPLY, TEXT, U8, U16, U32
+from bubble_protocol.messages import I16, I32, MESSAGES, REPLY, TEXT, U8, U16, U32
 from bubbleskin.link import wire
 from bubbleskin.sim.board import BOARDS
 
-RANGES = {U8: (0, 0xFF), U16: (0, 0xFFFF), U32: (0, 0xFFFFFFFF), I32: (-(1 << 31), (1 << 31) - 1)}
-UNASKED = {messages.TELEMETRY, messages.ERROR, messages.SEQUENCE_EVENT}
+RANGES = {
+    U8: (0, 0xFF),
+    U16: (0, 0xFFFF),
+    U32: (0, 0xFFFFFFFF),
+    I16: (-(1 << 15), (1 << 15) - 1),
+    I32: (-(1 << 31), (1 << 31) - 1),
+}
+UNASKED = {messages.TELEMETRY, messages.TELEMETRY_FIELDS, messages.ERROR, messages.SEQUENCE_EVENT}
 BUBBLES = 24  # the largest board a frame has room for
 
 FIELDS = [
@@ -132,6 +138,12 @@ def test_faults_are_bits_of_a_byte():
     assert messages.FAULTS[-1][0] <= 0x80
     for bit, name, _ in messages.FAULTS:
         assert getattr(messages, name.upper()) == bit
+
+
+def test_telemetry_columns_are_bits_of_the_field_that_chooses_them():
+    assert [column[0] for column in messages.COLUMNS] == [1 << bit for bit in range(len(messages.COLUMNS))]
+    (fields,) = [field for field in codec.BY_NAME["SUBSCRIBE_FIELDS"].fixed if field[0] == "fields"]
+    assert fields[4] == sum(column[0] for column in messages.COLUMNS)
 
 
 def test_every_error_of_the_schema_can_be_explained():

@@ -2,16 +2,20 @@
 
 All words are little-endian and blocks have a fixed size, the link's bytes at their end:
     into the firmware, per tick: u16 size of the link's bytes, u16 counts (per bubble, then the supply's), LINK_IN bytes
-    out of it, per tick: u16 size of the link's bytes, u16 pulses (fill and vent per bubble), u16 pump, u16 dump, LINK_OUT bytes
+        with LISTEN_ONLY in the size, no period has begun: the first count is then the time since the last one did, in µs
+    out of it, per block: u16 size of the link's bytes, u16 pulses (fill and vent per bubble), u16 pump, u16 dump, LINK_OUT bytes
 A size of 0xFFFF into the firmware has no answer: power fails and comes back.
 """
 
 import sys
 
+from bubble_firmware.app import LISTEN
 from bubble_firmware.drivers.flash import SECTOR, Memory
+from bubble_protocol.framing import copy
 
 LINK_IN = 256
 LINK_OUT = 1024
+LISTEN_ONLY = 0x8000
 RESET = 0xFF
 _FLASH = 4 * SECTOR
 
@@ -36,24 +40,34 @@ class Hands:
         self._link_in = len(self._in) - LINK_IN
         self._link_out = len(self._out) - LINK_OUT
         self._sent = 0
-        self._ticked = False
+        self._phase_us = 0
+        self._answered = True
 
     def wait(self):
-        """Hand over what the last tick decided and wait for the next; False for a restart or when the pipe has closed."""
-        if self._ticked:
+        """Hand over what the last block led to and wait for the next; 0 for a restart or when the pipe has closed."""
+        if not self._answered:
             out = self._out
             _put(out, 0, self._sent)
             self._stdout.write(out)
             self._sent = 0
+        self._answered = True
+        block = self._in
         if not self._restarting:
-            self.ended = self._stdin.readinto(self._in) != len(self._in)  # type: ignore[union-attr]
-            self._restarting = self._in[0] == RESET and self._in[1] == RESET
-        self._ticked = not self._restarting
+            self.ended = self._stdin.readinto(block) != len(block)  # type: ignore[union-attr]
+            self._restarting = block[0] == RESET and block[1] == RESET
         if self._restarting:
             self._restarting = False
             self.boot_id += 1
-            return False
-        return not self.ended
+            return 0
+        if self.ended:
+            return 0
+        self._answered = False
+        if block[1] & LISTEN_ONLY >> 8:
+            block[1] &= 255 - (LISTEN_ONLY >> 8)
+            self._phase_us = block[2] | block[3] << 8
+            return LISTEN
+        self._phase_us = 0
+        return 1
 
     def sense(self, counts):
         """Fill in the counts of this tick."""
@@ -87,18 +101,14 @@ class Hands:
         """Bytes that have come over the link."""
         block = self._in
         size = block[0] | block[1] << 8
-        for index in range(size):
-            buffer[index] = block[self._link_in + index]
+        copy(block, self._link_in, self._link_in + size, buffer, 0)
         return size
 
     def send(self, frame, length):
         """Queue a frame; False where it does not fit."""
         if self._sent + length > LINK_OUT:
             return False
-        out = self._out
-        at = self._link_out + self._sent
-        for index in range(length):
-            out[at + index] = frame[index]
+        copy(frame, 0, length, self._out, self._link_out + self._sent)
         self._sent += length
         return True
 
@@ -119,8 +129,8 @@ class Hands:
         self._restarting = True
 
     def phase_us(self):
-        """Time stands still within a tick."""
-        return 0
+        """Time stands still within a tick; between ticks it is told."""
+        return self._phase_us
 
 
 def _put(block, at, value):

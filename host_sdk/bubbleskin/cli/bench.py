@@ -14,7 +14,7 @@ from bubbleskin.bench.rows import Row
 from bubbleskin.cli.options import as_json
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
-_PARTS = ("simulation", "membrane", "contact")
+_PARTS = ("simulation", "membrane", "contact", "codec", "link", "clock")
 
 
 @click.command()
@@ -30,8 +30,9 @@ _PARTS = ("simulation", "membrane", "contact")
 def bench(parts: tuple[str, ...], target: str, json: bool) -> None:
     """Measure speeds and print them beside their targets.
 
-    PART: simulation (how fast simulated wristbands run), membrane (inversions, tables, fits) or contact (shapes of
-    bubbles that touch, and plans). Without one, all.
+    PART: simulation (how fast simulated wristbands run), membrane (inversions, tables, fits), contact (shapes of
+    bubbles that touch, and plans), codec (frames, beside pymavlink), link (round trips over a pseudo-terminal, beside a
+    plain echo) or clock (error of the device's time under jitter). Without one, all.
     """
     console = Console(stderr=json)
     rows: list[Row] = []

@@ -1,4 +1,4 @@
-"""Verbs that talk to a wristband: demo, info, show, monitor."""
+"""Verbs that talk to a wristband: demo, info, show."""
 
 import dataclasses
 import json as jsonlib
@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 import numpy as np
 from rich.console import Console
-from rich.live import Live
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -146,50 +145,4 @@ def show(
             Console().print(_reached(state, skin, f"settled at {state.time:.2f} s"))
 
 
-@click.command()
-@click.option("--rate", type=float, default=20.0, show_default=True, help="Times a second.")
-@click.option("--seconds", type=float, help="End after so many seconds of device time; without it, at Ctrl-C.")
-@device
-@as_json
-def monitor(rate: float, seconds: float | None, device: str | None, json: bool) -> None:
-    """Watch heights, pressures and faults live; with --json, a line for each state."""
-    with connect(device) as skin:
-        begin = None
-        with Live(console=Console(), auto_refresh=False) as live:
-            for state in skin.telemetry(rate):
-                begin = state.time if begin is None else begin
-                if json:
-                    click.echo(jsonlib.dumps(dataclasses.asdict(state), default=lambda array: array.tolist()))
-                else:
-                    live.update(_live(state), refresh=True)
-                if seconds is not None and state.time - begin >= seconds:
-                    break
-
-
-def _live(state: State) -> Table:
-    table = Table(
-        "bubble",
-        "target (mm)",
-        "height (mm)",
-        "",
-        "pressure (kPa)",
-        "status",
-        "faults",
-        title=f"{state.mode}, {state.time:.2f} s",
-    )
-    for bubble, height in enumerate(state.height_mm):
-        bar = "█" * round(height)  # one block per mm
-        status, faults = state.status[bubble], ", ".join(state.faults[bubble])
-        table.add_row(
-            str(bubble),
-            f"{state.target_mm[bubble]:.2f}",
-            f"{height:.2f}",
-            f"{bar:<14}",
-            f"{state.pressure_kpa[bubble]:.2f}",
-            status,
-            faults,
-        )
-    return table
-
-
-commands = [demo, info, show, monitor]
+commands = [demo, info, show]

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from bubbleskin.cli import bench, device, firmware, flash, membrane, plan, play, plot, sim, store
+from bubbleskin.cli import bench, device, firmware, flash, membrane, monitor, plan, play, plot, sim, store
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 
@@ -19,6 +19,7 @@ for _command in (
     *device.commands,
     *play.commands,
     *plan.commands,
+    *monitor.commands,
     *store.commands,
     *sim.commands,
     *membrane.commands,

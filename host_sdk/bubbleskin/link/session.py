@@ -14,13 +14,14 @@ from bubble_protocol import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.errors import DeviceRefused, DeviceSilent, LinkError, Overtaken, WrongDevice
 from bubbleskin.link import keepalive, sentences, wire
+from bubbleskin.link.inbox import UNASKED, Inbox
 from bubbleskin.link.transport import Transport
 from bubbleskin.link.window import Request, Window
 
 KEEP_ALIVE = 0.1
 """Seconds without anything sent after which the device hears a PING."""
 
-_TELEMETRY_KEPT = 4096
+_EVENTS_KEPT = 4096
 _SLICE = 0.02
 """Seconds for which one task reads before another has its turn; and between two attempts to open a lost port."""
 
@@ -43,10 +44,10 @@ class Link:
     def __init__(self, transport: Transport, timeout: float, *, event_loop: bool = False):
         self.transport = transport
         self.timeout = timeout
-        self.telemetry: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
+        self.telemetry = Inbox()
         self.on_open: Callable[[wire.Received], None] | None = None
         self.on_ping: Callable[[float, wire.Received, float], None] | None = None
-        self.events: deque[wire.Received] = deque(maxlen=_TELEMETRY_KEPT)
+        self.events: deque[wire.Received] = deque(maxlen=_EVENTS_KEPT)
         """What has happened to a sequence, as the device told it."""
         self._event_loop = event_loop
         # The thread that keeps the link alive between calls must not read or write during one.
@@ -263,14 +264,19 @@ class Link:
             self._write(data, now)
         if self._window.overdue and now - self._asked_at >= self._window.trip.timeout:
             self._say_hello(now)
-        if now >= self._sent_at + KEEP_ALIVE:
+        if now >= self._sent_at + self._pause:
             self._send_ping(0, now)
 
     def _due(self) -> float:
         """When `service` has something to do."""
         if self._gone:
             return self.transport.now() + _SLICE
-        return min(self._window.due(), self._sent_at + KEEP_ALIVE) if self.open else float("inf")
+        return min(self._window.due(), self._sent_at + self._pause) if self.open else float("inf")
+
+    @property
+    def _pause(self) -> float:
+        """KEEP_ALIVE, less a few ms that differ: pings in step with the device's ticks would tell the clock the same again."""
+        return KEEP_ALIVE - self._ping % 7 * 1.3e-3
 
     def tend(self) -> None:
         """What the thread that keeps the link alive does between calls; and take the reply to a PING when it comes."""
@@ -312,7 +318,7 @@ class Link:
         now = self.transport.now()
         for message in self._reader.feed(data):
             what = message["request"] if message.id == messages.ERROR else message.id & ~messages.REPLY
-            if message.id == messages.TELEMETRY:
+            if message.id in UNASKED:
                 self.telemetry.append(message)
             elif message.id == messages.SEQUENCE_EVENT:
                 self.events.append(message)

@@ -2,6 +2,8 @@
 
 import contextlib
 import errno
+import os
+import select
 import threading
 import time
 from collections.abc import Callable
@@ -50,6 +52,8 @@ class SerialTransport:
         # Each change of an rfc2217 port's timeout is negotiated with its server: it keeps one.
         self._negotiates = url.startswith("rfc2217:")
         self._port = self._open()
+        self._waitable: int | None = None
+        self._watch()
         self._attempt: Attempt | None = None
 
     def _open(self) -> Any:
@@ -64,6 +68,13 @@ class SerialTransport:
         except (serial.SerialException, OSError) as error:
             raise LinkError(_why_not(url, error)) from None
 
+    def _watch(self) -> None:
+        """Know what `select` can wait for, where it can."""
+        self._waitable = None
+        if not self._negotiates and os.name == "posix":
+            with contextlib.suppress(OSError, AttributeError):
+                self._waitable = self._port.fileno()
+
     def reopen(self) -> None:
         """Open the port again after it has gone; `LinkError` where it is not there yet. Takes no longer than 20 ms."""
         if self._attempt is None:
@@ -71,6 +82,7 @@ class SerialTransport:
         if self._attempt.done(_PATIENCE):  # closing a socket sleeps, finding another machine may take seconds
             attempt, self._attempt = self._attempt, None
             self._port = attempt.result()
+            self._watch()
         else:
             raise LinkError(f"{self.name} is still being opened.")
 
@@ -88,13 +100,16 @@ class SerialTransport:
         try:
             if self._negotiates:
                 return self._read_polling(timeout)
+            if self._waitable is not None:  # each change of a port's timeout costs as much as the whole read
+                ready, _, _ = select.select([self._waitable], [], [], max(timeout, 0.0))
+                return bytes(self._port.read(4096)) if ready else b""
             self._port.timeout = max(timeout, 0.0)
             first = self._port.read(1)
             if not first:
                 return b""
             self._port.timeout = 0
             return bytes(first + self._port.read(4096))
-        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed under our feet
+        except (serial.SerialException, OSError, TypeError, ValueError) as error:  # the last two: closed under our feet
             raise LinkError(
                 f"The connection to {self.name} is lost ({error}). Check the cable and connect again."
             ) from None
@@ -125,6 +140,7 @@ class SerialTransport:
 
     def close(self) -> None:
         """Let go of the port."""
+        self._waitable = -1 if self._waitable is not None else None  # its number may soon be another file's
         left = getattr(self._port, "_socket", None)  # pyserial forgets to close it when the other end has gone
         with contextlib.suppress(serial.SerialException, OSError):
             self._port.close()

@@ -1,14 +1,17 @@
 """Messages as Python values: names and numbers to frames, bytes to received messages. No I/O, no clock."""
 
+import struct
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import crcmod.predefined
 import numpy as np
 from numpy.typing import NDArray
 
 from bubble_protocol import codec, framing, messages, steps
+from bubbleskin.link.packing import BY_ID, BY_NAME
 
 _crc32 = crcmod.predefined.mkPredefinedCrcFun("crc-32")
 
@@ -32,7 +35,7 @@ class Received:
     id: int
     sequence: int
     fields: dict[str, int | str]
-    columns: dict[str, NDArray[np.int64]]
+    columns: Mapping[str, NDArray[np.int64]]
 
     def __getitem__(self, name: str) -> int:
         value = self.fields[name]
@@ -53,12 +56,14 @@ def encode(
     key: bytes = framing.NO_KEY,
 ) -> bytes:
     """The frame of one message: `fixed` fields in the schema's order, `repeated` rows likewise; `key` of `session_key`."""
-    message = codec.BY_NAME[name]
-    values = array("i", (_signed(value) for value in fixed))
-    for row in repeated:
-        values.extend(map(int, row))
+    packing = BY_NAME[name]
+    message = packing.message
     frame = bytearray(framing.FRAME_MAX)
-    end = message.pack(values, len(repeated), frame, framing.Decoder.PAYLOAD_AT)
+    try:
+        end = packing.pack(frame, framing.Decoder.PAYLOAD_AT, fixed, repeated)
+    except struct.error:  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
+        values = array("i", map(_signed, chain(fixed, *repeated)))
+        end = message.pack(values, len(repeated), frame, framing.Decoder.PAYLOAD_AT)
     framing.put_header(frame, message.id, sequence)
     return bytes(frame[: framing.seal(frame, end - 1, _crc32_into, key)])
 
@@ -68,7 +73,6 @@ class Reader:
 
     def __init__(self, key: bytes = framing.NO_KEY) -> None:
         self._decoder = framing.Decoder(_crc32_into, key)
-        self._values = array("i", bytes(4 * framing.PAYLOAD_MAX))
         self.unknown = 0
 
     def use(self, key: bytes) -> None:
@@ -98,27 +102,17 @@ class Reader:
 
     def _message(self) -> Received | None:
         decoder = self._decoder
-        message = codec.BY_ID.get(decoder.message_id)
-        if message is None:
+        packing = BY_ID.get(decoder.message_id)
+        if packing is None:
             return None
+        message = packing.message
         size = decoder.length - framing.HEADER
-        count = message.unpack(decoder.frame, framing.Decoder.PAYLOAD_AT, size, self._values)
+        if not message.stride:
+            size = min(size, message.fixed_size)  # fields that newer firmware has appended
+        count = message.count(size)
         if count < 0:
             return None
-        fields: dict[str, int | str] = {}
-        at = 0
-        for name, kind, *_ in message.fixed:
-            if kind == messages.TEXT:
-                text = bytes(self._values[at : at + 16].tolist()).rstrip(b"\0")
-                fields[name] = text.decode("ascii", "replace")
-                at += 16
-            else:
-                value = self._values[at]
-                fields[name] = value & 0xFFFFFFFF if kind == messages.U32 else value
-                at += 1
-        stride = message.stride_values
-        rows = np.array(self._values[at : at + count * stride], dtype=np.int64).reshape(count, stride)
-        columns = {field[0]: rows[:, index] for index, field in enumerate(message.repeated)}
+        fields, columns = packing.unpack(decoder.frame, framing.Decoder.PAYLOAD_AT, count)
         return Received(decoder.message_id, decoder.sequence, fields, columns)
 
 
@@ -213,5 +207,4 @@ def explain(error: Received) -> str:
 
 def _signed(value: int) -> int:
     """A number as a signed 32-bit word."""
-    value = int(value)
-    return value - (1 << 32) if value > 0x7FFFFFFF else value
+    return ((int(value) & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000

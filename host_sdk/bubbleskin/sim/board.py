@@ -42,6 +42,9 @@ class Firmware(Protocol):
     def reset(self) -> None:
         """Power fails and comes back: start again, with what flash holds."""
 
+    def listen(self, link: bytes, phase_us: int) -> Outputs:
+        """Bytes of the link so many µs after a period has begun."""
+
     def close(self) -> None:
         """End it."""
 
@@ -66,6 +69,7 @@ class InProcessFirmware:
         self._dump = False
         self._in = b""
         self._out = bytearray()
+        self._phase_us = 0
         self.app = App(board, self)
 
     def tick(self, counts: array, link: bytes) -> Outputs:
@@ -73,6 +77,7 @@ class InProcessFirmware:
         self._counts = counts
         self._in = link
         self._out.clear()
+        self._phase_us = 0
         self.app.tick()
         if self._restarting:
             self.reset()
@@ -83,6 +88,14 @@ class InProcessFirmware:
         self._restarting = False
         self.boot_id += 1
         self.app = App(self._board, self)
+
+    def listen(self, link: bytes, phase_us: int) -> Outputs:
+        """See `Firmware`."""
+        self._in = link
+        self._out.clear()
+        self._phase_us = phase_us
+        self.app.listen()
+        return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
 
     def close(self) -> None:
         """Nothing to end."""
@@ -129,8 +142,8 @@ class InProcessFirmware:
         self._restarting = True
 
     def phase_us(self) -> int:
-        """Time stands still within a tick."""
-        return 0
+        """Time stands still within a tick; between ticks it is told."""
+        return self._phase_us
 
 
 class SimulatedBoard:
@@ -200,6 +213,15 @@ class SimulatedBoard:
         del self.to_device[:LINK_IN]
         outputs = self.firmware.tick(self._counts, link)
         self.plant.advance(self.tick_s, self.pulses[:, 0], self.pulses[:, 1], self._pump, self._dump)
+        self._take(outputs)
+
+    def listen(self, phase_us: int) -> None:
+        """Between two ticks, `phase_us` after the last: the firmware answers what has come over the link."""
+        link = bytes(self.to_device[:LINK_IN])
+        del self.to_device[:LINK_IN]
+        self._take(self.firmware.listen(link, phase_us))
+
+    def _take(self, outputs: Outputs) -> None:
         self.from_device += outputs.link
         if outputs.pulses != self._decided:
             self._decided = outputs.pulses

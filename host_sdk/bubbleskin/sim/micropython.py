@@ -11,12 +11,12 @@ from types import ModuleType
 
 import bubble_firmware
 import bubble_protocol
-from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT, RESET
+from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
 from bubbleskin.errors import LinkError
 from bubbleskin.interpreter import find_micropython
 from bubbleskin.sim.board import Outputs
 
-HEAP = "276k"
+HEAP = "320k"
 """Less than on a Pico, which has 237 kB for the firmware's data: here its code, 95 kB, is in the heap too, there in flash,
 and so are the 16 kB that stand for its flash."""
 
@@ -60,7 +60,15 @@ class MicroPythonFirmware:
 
     def tick(self, counts: array, link: bytes) -> Outputs:
         """See `Firmware`."""
-        self._write(len(link).to_bytes(2, "little") + counts.tobytes() + link.ljust(LINK_IN, b"\0"))
+        return self._exchange(len(link).to_bytes(2, "little") + counts.tobytes() + link.ljust(LINK_IN, b"\0"))
+
+    def listen(self, link: bytes, phase_us: int) -> Outputs:
+        """See `Firmware`."""
+        head = (len(link) | LISTEN_ONLY).to_bytes(2, "little") + phase_us.to_bytes(2, "little")
+        return self._exchange(head.ljust(2 + 2 * (self._n + 1), b"\0") + link.ljust(LINK_IN, b"\0"))
+
+    def _exchange(self, block: bytes) -> Outputs:
+        self._write(block)
         answer = self._read()
         sent = int.from_bytes(answer[:2], "little")
         pulses = array("H", answer[2 : 2 + 4 * self._n])

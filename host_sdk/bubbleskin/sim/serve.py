@@ -107,14 +107,24 @@ def serve(board: Board, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lamb
     """Run `board` at the wall clock's pace behind `end` for as long as `running()`; yields the board after every tick."""
     pace = Pace(board)
     out = bytearray()
+    tick_us = round(board.tick_s * 1e6)
     while running():
         while (ahead := -pace.owed()) > 0:
             data = end.wait(ahead)
-            board.to_device += data
+            if data:
+                board.to_device += data
+                phase = tick_us + round(pace.owed() * 1e6)
+                board.listen(min(max(phase, 0), tick_us))
+                _hand_over(board, end, out)
         board.to_device += end.wait(0)
         board.tick()
-        out += board.from_device
-        board.from_device.clear()
-        del out[: end.write(bytes(out)) if out else 0]
-        del out[: max(0, len(out) - _OUT_MAX)]
+        _hand_over(board, end, out)
         yield board
+
+
+def _hand_over(board: Board, end: PtyEnd | TcpEnd, out: bytearray) -> None:
+    """What the board sends, and what `out` still has of it, as far as it fits."""
+    out += board.from_device
+    board.from_device.clear()
+    del out[: end.write(bytes(out)) if out else 0]
+    del out[: max(0, len(out) - _OUT_MAX)]

@@ -15,6 +15,7 @@ class Board(Protocol):
 
     to_device: bytearray
     from_device: bytearray
+    tick_s: float
 
     @property
     def time(self) -> float:
@@ -22,6 +23,9 @@ class Board(Protocol):
 
     def tick(self) -> None:
         """Let one period pass."""
+
+    def listen(self, phase_us: int) -> None:
+        """Let the firmware answer what has come, `phase_us` after a period has begun."""
 
     def close(self) -> None:
         """End it."""

@@ -163,6 +163,9 @@ class Rp2040Board:
         self.chip.run(self.tick_s)
         self._valves.advance()
 
+    def listen(self, phase_us: int) -> None:
+        """Nothing: the chip looks at its link when it likes."""
+
     def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
         """Give the board a fault, as of `Plant.inject` or one of `FAULTS`; a value of 0 takes it away.
 

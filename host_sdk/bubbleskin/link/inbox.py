@@ -1,0 +1,42 @@
+"""Telemetry that has come: kept for whoever reads it, counted, and handed to those who listen."""
+
+from collections import deque
+from collections.abc import Callable
+
+from bubble_protocol import messages
+from bubbleskin.link.wire import Received
+
+UNASKED = (messages.TELEMETRY, messages.TELEMETRY_FIELDS)
+"""Messages that answer no request."""
+
+_KEPT = 4096
+
+
+class Inbox(deque[Received]):
+    """The newest telemetry, oldest first. `listeners` are called with each message and `lost` as it comes.
+
+    `lost` counts the messages that were due since `begin` and have not come: gaps in the sequence numbers, whether
+    the device found no room or the link lost them.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(maxlen=_KEPT)
+        self.listeners: list[Callable[[Received, int], None]] = []
+        self.lost = 0
+        self._sequence = 0
+
+    def begin(self) -> None:
+        """A new subscription: sequence numbers begin at 1."""
+        self.clear()
+        self.lost = 0
+        self._sequence = 0
+
+    def append(self, message: Received) -> None:
+        """Take one message."""
+        gap = (message.sequence - self._sequence - 1) & 0xFFFF
+        if gap < 0x8000:  # else one of a subscription that has ended, still on its way
+            self.lost += gap
+            self._sequence = message.sequence
+        super().append(message)
+        for listener in tuple(self.listeners):
+            listener(message, self.lost)
