@@ -33,8 +33,8 @@ _SHORTEST = 1 + HEADER + CRC  # without the delimiter
 
 
 @micropython.viper
-def _stuff(frame: ptr8, end: int, key: ptr8):
-    """Mix the key into the CRC, then put the distance to the next zero in place of every zero of `frame[0:end]`."""
+def _mix(frame: ptr8, end: int, key: ptr8):
+    """Mix the key into the CRC before `end`, where the frame has one; a zero at `end`."""
     what = frame[1]
     if not (what == _HELLO or what == _HELLO_REPLY or (what == _ERROR and frame[4] == _HELLO)):
         frame[end - 4] ^= key[0]
@@ -42,6 +42,11 @@ def _stuff(frame: ptr8, end: int, key: ptr8):
         frame[end - 2] ^= key[2]
         frame[end - 1] ^= key[3]
     frame[end] = 0
+
+
+@micropython.viper
+def _stuff(frame: ptr8, end: int):
+    """Put the distance to the next zero in place of every zero of `frame[0:end]`; one stands at `end`."""
     at = 0
     i = 1
     while i <= end:
@@ -108,7 +113,8 @@ def seal(frame, length, crc32_into, key=NO_KEY):
     """
     end = 1 + length + CRC
     crc32_into(frame, 1, 1 + length, frame, 1 + length)
-    _stuff(frame, end, key)
+    _mix(frame, end, key)
+    _stuff(frame, end)
     return end + 1
 
 

@@ -264,17 +264,17 @@ class Link:
             self._write(data, now)
         if self._window.overdue and now - self._asked_at >= self._window.trip.timeout:
             self._say_hello(now)
-        if now >= self._sent_at + self._pause:
+        if now >= self._sent_at + self._quiet:
             self._send_ping(0, now)
 
     def _due(self) -> float:
         """When `service` has something to do."""
         if self._gone:
             return self.transport.now() + _SLICE
-        return min(self._window.due(), self._sent_at + self._pause) if self.open else float("inf")
+        return min(self._window.due(), self._sent_at + self._quiet) if self.open else float("inf")
 
     @property
-    def _pause(self) -> float:
+    def _quiet(self) -> float:
         """KEEP_ALIVE, less a few ms that differ: pings in step with the device's ticks would tell the clock the same again."""
         return KEEP_ALIVE - self._ping % 7 * 1.3e-3
 
