@@ -17,6 +17,8 @@ class Curve:
         self.height = [float(knot[0]) for knot in knots]
         self.air = [float(knot[1]) for knot in knots]
         self.pressure = [float(knot[2]) for knot in knots]
+        self.lowest = min(self.pressure)
+        self.highest = max(self.pressure)
         self.last = len(knots) - 2
 
     def within(self, values, value, seg):
@@ -32,9 +34,9 @@ class Curve:
         """The air at `pressure`, on the branch nearest to segment `seg`."""
         low = high = seg
         p = self.pressure
-        if pressure < min(p):
+        if pressure < self.lowest:
             return self.air[0]
-        if pressure > max(p):
+        if pressure > self.highest:
             return self.air[-1]
         turn = False
         while (pressure - p[seg]) * (p[seg + 1] - pressure) < 0:
@@ -59,7 +61,6 @@ class Bubble:
         self.board = board
         self.curve = curve
         self.gain = board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO)) / 65536
-        self.lowest = min(curve.pressure)
         self.air = curve.air[0]
         self.dose = self.next = self.flow = self.integral = self.error = self.aim = 0.0
         self.busy = self.total = 0.0
