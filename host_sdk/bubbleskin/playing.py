@@ -19,8 +19,8 @@ from bubbleskin.shape.sequence import Playable, Settled, playable
 _STATES = {number: name for number, name, _ in messages.SEQUENCE_STATES}
 _REASONS = {number: name for number, name, _ in messages.SEQUENCE_REASONS}
 _WORDS_PER_MESSAGE = 121
-_POLL = 0.5
-"""Seconds without news after which the device is asked."""
+_POLL = 0.2
+"""Seconds after which the device is asked, news or not: it must hear from its host, and an event can be lost."""
 _NAMED = 3  # heights in a sentence
 _TOP_UP = 0.05
 """Seconds between two looks at whether a stream's memory has room."""
@@ -137,21 +137,21 @@ class Player:
     async def _follow(self, feed: "_Feed", progress: Progress) -> Played:
         """Take the device's events until the sequence has ended; where none come, ask."""
         link = self._link
+        now = link.transport.now
         told = _Told(feed, self._layout, self._info.tick)
+        asked = now()
         while True:
-            patience = _TOP_UP if feed.unsent else _POLL
-            await link.wait(link.transport.now() + patience, lambda: bool(link.events))
+            await link.wait(now() + _TOP_UP if feed.unsent else asked + _POLL, lambda: bool(link.events))
             with contextlib.suppress(DeviceRefused):  # it has ended meanwhile: the device will say why
                 await feed.fill()
-            if link.events:
-                playing = told.take(link.events.popleft())
-            else:
-                playing = await self.state()
-                if link.events:
-                    continue
-                if playing.state == "ended":
-                    told.lost += 1  # the event that says so
-                playing = dataclasses.replace(playing, played=len(told.steps))
+            playing = told.take(link.events.popleft()) if link.events else None
+            if now() >= asked + _POLL:
+                state = await self.state()
+                asked = now()
+                if not playing and not link.events:
+                    if state.state == "ended":
+                        told.lost += 1  # the event that says so
+                    playing = dataclasses.replace(state, played=len(told.steps))
             if playing:
                 if playing.state == "ended":
                     return await self._end(told, playing)
