@@ -20,6 +20,7 @@ class Bubbles:
         self._board = array("i", bytearray(4 * control.BOARD))
         self._tables = tables
         self._knots = tables.knots
+        self.rows, self.board = self._rows, self._board  # the guard looks at them
         k = self._board
         k[control.N] = n
         k[control.TICK_US] = board.TICK_US
@@ -101,6 +102,10 @@ class Bubbles:
         What leads to a fault goes on counting: a host that clears all the time does not disarm the guard.
         """
         control.forget(self._rows, self.count)
+
+    def forget(self, bubble):
+        """The same for one bubble."""
+        self._rows[bubble * control.ROW + control.FAULTS] = 0
 
     def pressure_pa(self, bubble):
         """Gauge pressure of one bubble."""

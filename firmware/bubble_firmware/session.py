@@ -7,11 +7,12 @@ buffer that grows and allocates nothing in steady state.
 from array import array
 
 from bubble_firmware import control
+from bubble_firmware.care import Care
 from bubble_firmware.table import KNOTS_MAX
 from bubble_firmware.ticks import BINS
 from bubble_protocol import codec, framing, messages
 from bubble_protocol.crc import crc32_into, crc32_word
-from bubble_protocol.messages import VENTED
+from bubble_protocol.messages import IDLE
 from bubble_protocol.portable import heap_free
 from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
 
@@ -57,6 +58,7 @@ class Session:
             messages.TICKS: self._ticks,
             messages.RESTART: self._restart,
         }
+        self._requests.update(Care(app, self).handlers())
 
     def poll(self):
         """Handle what has come since the last tick; send telemetry when it is due."""
@@ -87,6 +89,7 @@ class Session:
 
     def _handle(self, message_id, size):
         self._handling = message_id
+        self._app.heard()
         handler = self._requests.get(message_id)
         if handler is None:
             self._refuse(messages.UNKNOWN_MESSAGE, 0, _NO_ELEMENT, message_id, 0, 0)
@@ -141,7 +144,7 @@ class Session:
         values[26] = board.HEIGHT_MAX_UM
         values[27] = board.PRESSURE_MAX_PA
         values[28] = 1  # one request at a time
-        values[29] = 0
+        values[29] = 2  # safety
         values[30] = self._app.tables.crc
         self._reply(0)
 
@@ -160,7 +163,7 @@ class Session:
         values[4] = self._decoder.good
         values[5] = self._decoder.bad
         values[6] = self.telemetry_dropped
-        if app.mode == VENTED:  # counting takes longer than a tick
+        if app.mode == IDLE:  # counting takes longer than a tick
             app.hands.slack()
             self._heap_free = heap_free()
         values[7] = self._heap_free

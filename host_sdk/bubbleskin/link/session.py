@@ -10,11 +10,15 @@ from bubble_protocol import codec, messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.errors import DeviceRefused, DeviceSilent, LinkError, WrongDevice
 from bubbleskin.link import wire
+from bubbleskin.link.ticks import DeviceTicks
 from bubbleskin.link.transport import Transport
 
 RESEND = 0.25
 """Seconds after which a request without a reply is sent again. Every request of this version may be
 handled twice with the same outcome."""
+
+KEEP_ALIVE = 0.1
+"""Seconds without a request after which a waiting link says PING: the wristband vents where its host is silent."""
 
 _TELEMETRY_KEPT = 4096
 _SLICE = 0.02
@@ -40,6 +44,8 @@ class Link:
         self._heard = False
         self._replies: dict[int, wire.Received] = {}
         self._sequence = 0
+        self._spoke = transport.now()
+        self._clock = DeviceTicks()
         self._reading = asyncio.Lock()
         self._thread: asyncio.Future[None] | None = None
 
@@ -70,7 +76,7 @@ class Link:
         patience = self.timeout if timeout is None else timeout
         deadline = self.transport.now() + patience
         while (now := self.transport.now()) < deadline:
-            self.transport.write(frame)
+            self._send(frame)
             await self.wait(min(deadline, now + RESEND), lambda: sequence in self._replies)
             reply = self._replies.pop(sequence, None)
             if reply is None:
@@ -88,11 +94,18 @@ class Link:
 
     async def wait(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
         """Take what comes until `done()` or the transport's clock stands at `until`."""
-        while not done() and self.transport.now() < until:
+        while not done() and (now := self.transport.now()) < until:
+            if now >= self._spoke + KEEP_ALIVE - 1e-9:
+                self._sequence = self._sequence + 1 & 0xFFFF
+                self._send(wire.encode("PING", self._sequence, (0,)))
             async with self._reading:
-                left = until - self.transport.now()
+                left = min(until, self._spoke + KEEP_ALIVE) - self.transport.now()
                 if left > 0 and not done():
                     await self._receive(left)
+
+    def _send(self, frame: bytes) -> None:
+        self.transport.write(frame)
+        self._spoke = self.transport.now()
 
     async def close(self) -> None:
         """Let go of the transport."""
@@ -106,6 +119,7 @@ class Link:
     def _take(self, data: bytes) -> None:
         self._heard = self._heard or bool(data)
         for message in self._reader.feed(data):
+            self._clock.unwrap(message)
             if message.id == messages.TELEMETRY:
                 self.telemetry.append(message)
             elif message.id & messages.REPLY or message.id == messages.ERROR:

@@ -1,0 +1,319 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
+"""Watches every bubble for what control cannot mend, and for how long it has been under pressure.
+
+`check` runs in every tick between `control.estimate` and `control.control`, on the same rows, and sets the fault
+bits that make control isolate a bubble. What it goes by, with thresholds and measured times, is in docs/safety.md:
+
+- the *book of air*: `estimate` adds what the valves have brought and then moves the sum to what the sensor says. What
+  is taken away in this way is air that is missing, what is added is surplus. Two leaky buckets collect them.
+- a *closed* line must keep its pressure; a *filling* one must show the tube's pressure loss; the table's pressure
+  and the sensor's must not part; a *vented* one must fall.
+- a sensor has noise: one that always says the same is not read.
+
+State that is watched but not controlled stands in rows of its own. It allocates nothing.
+"""
+
+from array import array
+
+from bubble_protocol.portable import const, micropython, ptr16, ptr32, uint
+
+# From `control`; a test compares them.
+PRESSURE = const(5)
+AIR = const(8)
+DOSE = const(9)
+NEXT = const(10)
+BUSY = const(11)
+FLOW = const(14)
+INTEGRAL = const(15)
+FILL_US = const(18)
+VENT_US = const(19)
+LOST = const(22)
+FAULTS = const(23)
+STATUS = const(24)
+HEIGHT = const(25)
+MODEL = const(2)
+ROW = const(39)
+N = const(0)
+TICK_US = const(1)
+TUBE = const(12)
+RAMP_DONE = const(21)
+RAMP_TICKS = const(22)
+RESTING = const(0)
+MOVING = const(1)
+FAULT = const(4)
+# From the schema; the same test.
+LEAK = const(8)
+NO_AIR = const(16)
+VALVE_STUCK = const(32)
+SENSOR_STUCK = const(64)
+BUDGET = const(128)
+
+# A row of the guard's.
+WAS_AIR = const(0)  # µJ, at the start of the last period; -1: not begun
+WAS_PA = const(1)
+MISSING = const(2)  # µJ that were brought and are not there
+SURPLUS = const(3)  # µJ that are there and were not brought
+SAME = const(4)  # ticks for which the sensor has said the same
+SINCE_PA = const(5)  # at the beginning of what is being watched: closed, filling or vented
+SINCE = const(6)  # ticks, negative before it begins
+WRONG = const(7)  # ticks in a row in which the pressure was out of bounds, + LEAPT where it went there in one
+RUN = const(8)  # ticks in a row with the fill valve open
+BASE_PA = const(9)  # before it opened
+DRY = const(10)  # ticks in a row of these without a sign of flow
+APART = const(11)  # ticks in a row in which table and sensor were far apart
+INFLOW = const(12)  # whether air has come in that was not asked for
+LOAD = const(13)  # of the budget, Pa ticks
+SPENT = const(14)  # whether it was used up and has not recovered
+SEEN = const(15)  # faults that are in the log
+GUARD = const(16)
+
+# The board's numbers for it.
+ALLOWED = const(0)  # µJ in a tick that may get lost
+LIMIT = const(1)  # µJ that may be missing, or surplus
+FROZEN = const(2)  # ticks
+WINDOW = const(3)  # ticks for which a closed line is compared with its beginning
+STALL = const(4)  # ticks in which a vented line must fall
+FLOWS = const(5)  # ticks after which a filling line must show flow
+DRY_MAX = const(6)
+APART_MAX = const(7)
+FREE_PA = const(8)  # pressure that costs no budget
+LOAD_MAX = const(9)  # Pa ticks
+NUMBERS = const(10)
+
+CLOSED_PA = const(1200)  # a closed line keeps its pressure within
+LEAP_PA = const(4500)  # more than any air brings about in a tick
+LEAPT = const(8)
+READINGS = const(2)  # in a row: one alone is noise
+APART_PA = const(9000)
+NO_PA = const(1500)  # as good as nothing
+FLAT_PA = const(1000)  # below it a vented bubble is flat
+VENTED_PA = const(3000)  # below it a vented line need not fall
+FALL_PA = const(1000)  # by which it must fall otherwise
+OVERFILLED_PA = const(12000)  # 5.8 mm: more in a vented bubble, and the supply is shut down for all
+
+# What `check` says.
+NEW, MOVES, PRESSED, OVERFILLED = 1, 2, 4, 8
+_NEW = const(1)
+_MOVES = const(2)
+_PRESSED = const(4)
+_OVERFILLED = const(8)
+
+_LIMIT_UJ = const(60000)
+_ALLOWED_UJ_S = const(60000)
+_WINDOW_US = const(300000)
+_STALL_US = const(300000)
+_FLOWS_US = const(15000)
+_DRY_US = const(30000)
+_APART_US = const(40000)
+
+
+@micropython.viper
+def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
+    n = k[N]
+    tick = k[TICK_US]
+    said = 2 if k[RAMP_DONE] < k[RAMP_TICKS] else 0
+    while n > 0:
+        p = s[PRESSURE]
+        air = s[AIR]
+        faults = s[FAULTS]
+        if g[WAS_AIR] < 0:
+            g[SINCE_PA] = p
+            g[WAS_AIR] = air
+
+        # A sensor has noise.
+        leap = p - g[WAS_PA]
+        if leap or s[LOST]:
+            g[SAME] = 0
+            g[WAS_PA] = p
+        else:
+            g[SAME] = g[SAME] + 1
+            if g[SAME] >= w[FROZEN]:
+                faults |= SENSOR_STUCK
+
+        # The budget: what is above the threshold adds up, what is below recovers.
+        load = g[LOAD] + p - w[FREE_PA]
+        if load < 0:
+            load = 0
+        if load > w[LOAD_MAX]:
+            load = w[LOAD_MAX] + 1
+            g[SPENT] = 1
+        g[LOAD] = load
+        if g[SPENT]:
+            if load < w[LOAD_MAX] >> 1:
+                g[SPENT] = 0
+            else:
+                faults |= BUDGET
+
+        if s[STATUS] == RESTING or s[STATUS] == FAULT:
+            # Vented: the pressure falls, or is gone.
+            g[MISSING] = 0
+            g[SURPLUS] = 0
+            g[RUN] = 0
+            g[APART] = 0
+            g[WRONG] = 0
+            if p > FLAT_PA:
+                said |= _PRESSED
+            if g[SINCE] < 0:
+                g[SINCE] = 0
+            if p < VENTED_PA or p < g[SINCE_PA] - FALL_PA:
+                g[SINCE_PA] = p
+                g[SINCE] = 0
+            elif s[LOST] == 0:
+                g[SINCE] = g[SINCE] + 1
+                if p > g[SINCE_PA] + FALL_PA:
+                    g[INFLOW] = 1
+                if g[SINCE] >= w[STALL]:
+                    faults |= VALVE_STUCK
+                    if g[INFLOW] and p > OVERFILLED_PA:
+                        said |= _OVERFILLED
+            if p < VENTED_PA and faults == 0:
+                g[INFLOW] = 0
+        else:
+            said |= _PRESSED
+            if s[STATUS] == MOVING:
+                said |= _MOVES
+            if s[LOST] == 0:
+                # The book of air.
+                found = air - g[WAS_AIR] - s[DOSE]
+                lost = g[MISSING] - found - w[ALLOWED]
+                g[MISSING] = lost if lost > 0 else 0
+                more = g[SURPLUS] + found - w[ALLOWED]
+                g[SURPLUS] = more if more > 0 else 0
+                if lost > w[LIMIT]:
+                    faults |= LEAK
+                if more > w[LIMIT]:
+                    faults |= VALVE_STUCK
+                    g[INFLOW] = 1
+
+                # Table and sensor.
+                apart = s[HEIGHT + MODEL] - p
+                if apart > APART_PA or apart < 0 - APART_PA:
+                    g[APART] = g[APART] + 1
+                    if g[APART] >= w[APART_MAX]:
+                        if apart < 0:
+                            faults |= VALVE_STUCK
+                            g[INFLOW] = 1
+                        elif p < NO_PA:
+                            faults |= NO_AIR
+                        else:
+                            faults |= LEAK
+                else:
+                    g[APART] = 0
+
+                # Filling: the tube's loss of pressure shows.
+                if s[FILL_US] == tick:
+                    g[RUN] = g[RUN] + 1
+                    if g[RUN] > w[FLOWS]:
+                        if p - g[BASE_PA] < (k[TUBE] * s[FLOW] >> 4) // 3:
+                            g[DRY] = g[DRY] + 1
+                            if g[DRY] >= w[DRY_MAX]:
+                                faults |= NO_AIR
+                        else:
+                            g[DRY] = 0
+                else:
+                    g[RUN] = 0
+                    g[DRY] = 0
+                    g[BASE_PA] = p
+
+                # Closed and quiet: the pressure stays.
+                if s[FILL_US] or s[VENT_US] or s[BUSY] > 0:
+                    g[SINCE] = -1
+                else:
+                    if g[SINCE] < 0 or g[SINCE] >= w[WINDOW]:
+                        g[SINCE_PA] = p
+                        g[SINCE] = 0
+                        g[WRONG] = 0
+                    g[SINCE] = g[SINCE] + 1
+                    change = p - g[SINCE_PA]
+                    if change > CLOSED_PA or change < 0 - CLOSED_PA:
+                        g[WRONG] = g[WRONG] + 1 if g[WRONG] or leap <= LEAP_PA else LEAPT + 1
+                        if g[WRONG] & (LEAPT - 1) >= READINGS:
+                            if change < 0:
+                                faults |= LEAK
+                            elif g[WRONG] >= LEAPT:
+                                faults |= SENSOR_STUCK
+                            else:
+                                faults |= VALVE_STUCK
+                                g[INFLOW] = 1
+                    else:
+                        g[WRONG] = 0
+        g[WAS_AIR] = air
+        if faults:
+            s[FAULTS] = faults
+        g[SEEN] = g[SEEN] & faults
+        if g[SEEN] != faults:
+            said |= _NEW
+        n -= 1
+        s = ptr32(uint(s) + 4 * ROW)
+        g = ptr32(uint(g) + 4 * GUARD)
+    return said
+
+
+@micropython.viper
+def _spare(s: ptr32, pulse: ptr16, supply: int, n: int):
+    i = 0
+    while i < n:
+        if pulse[2 * i] and supply < s[PRESSURE]:
+            pulse[2 * i] = 0
+            s[FILL_US] = 0
+            s[NEXT] = 0
+            s[INTEGRAL] = 0
+        i += 1
+        s = ptr32(uint(s) + 4 * ROW)
+
+
+class Guard:
+    """Watches `bubbles`. `check` returns what it has found as bits: NEW faults, MOVES, PRESSED, OVERFILLED."""
+
+    def __init__(self, board, bubbles):
+        n = board.BUBBLES
+        self._bubbles = bubbles
+        self._count = n
+        self._tick_us = board.TICK_US
+        self._enough_pa = board.PRESSURE_MAX_PA
+        self._rows = array("i", bytearray(4 * GUARD * n))
+        self._numbers = w = array("i", bytearray(4 * NUMBERS))
+        w[ALLOWED] = _ALLOWED_UJ_S * board.TICK_US // 1000000
+        w[LIMIT] = _LIMIT_UJ
+        w[FROZEN] = board.FROZEN_US // board.TICK_US
+        w[WINDOW] = _WINDOW_US // board.TICK_US
+        w[STALL] = _STALL_US // board.TICK_US
+        w[FLOWS] = -(-_FLOWS_US // board.TICK_US)
+        w[DRY_MAX] = _DRY_US // board.TICK_US
+        w[APART_MAX] = _APART_US // board.TICK_US
+        w[FREE_PA] = board.BUDGET_FREE_PA
+        self.set_budget(board.BUDGET_KPA_S)
+        for at in range(0, n * GUARD, GUARD):
+            self._rows[at + WAS_AIR] = -1
+            self._rows[at + SINCE] = -1
+
+    def set_budget(self, kpa_s):
+        """How much pressure times time above the threshold each bubble may have."""
+        self._numbers[LOAD_MAX] = kpa_s * (1000000000 // self._tick_us)
+
+    def check(self):
+        """Look at all bubbles, after `Bubbles.sense`."""
+        bubbles = self._bubbles
+        return _check(bubbles.rows, self._rows, bubbles.board, self._numbers)
+
+    def spare(self, supply_pa):
+        """After `Bubbles.decide`: no fill valve opens to a supply below the bubble's pressure, which would empty it."""
+        if supply_pa < self._enough_pa:
+            bubbles = self._bubbles
+            _spare(bubbles.rows, bubbles.pulses, supply_pa, self._count)
+
+    def unseen(self, bubble):
+        """The fault bits of a bubble that are new since the last time."""
+        at = bubble * GUARD + SEEN
+        faults = self._bubbles.faults(bubble)
+        new = faults & ~self._rows[at]
+        self._rows[at] = faults
+        return new
+
+    def forget(self, bubble):
+        """The faults of this bubble are acknowledged: those that still are there are new."""
+        self._rows[bubble * GUARD + SEEN] = 0
+
+    def load_kpa_s(self, bubble):
+        """How much of its budget a bubble has used, kPa s."""
+        return self._rows[bubble * GUARD + LOAD] // (1000000000 // self._tick_us)
