@@ -6,8 +6,8 @@ bits that make control isolate a bubble. What it goes by, with thresholds and me
 
 - the *book of air*: `estimate` adds what the valves have brought and then moves the sum to what the sensor says. What
   is taken away in this way is air that is missing, what is added is surplus. Two leaky buckets collect them.
-- a *closed* line must keep its pressure; a *filling* one must show the tube's pressure loss; the table's pressure
-  and the sensor's must not part; a *vented* one must fall.
+- a *closed* line must keep its pressure, an open valve must show the tube's loss of pressure, a bubble that is *fed*
+  must get some, and a *vented* one must lose it.
 - a sensor has noise: one that always says the same is not read.
 
 State that is watched but not controlled stands in rows of its own. It allocates nothing.
@@ -18,6 +18,8 @@ from array import array
 from bubble_protocol.portable import const, micropython, ptr16, ptr32, uint
 
 # From `control`; a test compares them.
+OPENS_US = const(1)
+CLOSES_US = const(2)
 PRESSURE = const(5)
 AIR = const(8)
 DOSE = const(9)
@@ -30,8 +32,6 @@ VENT_US = const(19)
 LOST = const(22)
 FAULTS = const(23)
 STATUS = const(24)
-HEIGHT = const(25)
-MODEL = const(2)
 ROW = const(39)
 N = const(0)
 TICK_US = const(1)
@@ -54,37 +54,42 @@ WAS_PA = const(1)
 MISSING = const(2)  # µJ that were brought and are not there
 SURPLUS = const(3)  # µJ that are there and were not brought
 SAME = const(4)  # ticks for which the sensor has said the same
-SINCE_PA = const(5)  # at the beginning of what is being watched: closed, filling or vented
-SINCE = const(6)  # ticks, negative before it begins
-WRONG = const(7)  # ticks in a row in which the pressure was out of bounds, + LEAPT where it went there in one
-RUN = const(8)  # ticks in a row with the fill valve open
-BASE_PA = const(9)  # before it opened
-DRY = const(10)  # ticks in a row of these without a sign of flow
-APART = const(11)  # ticks in a row in which table and sensor were far apart
-INFLOW = const(12)  # whether air has come in that was not asked for
-LOAD = const(13)  # of the budget, Pa ticks
-SPENT = const(14)  # whether it was used up and has not recovered
-SEEN = const(15)  # faults that are in the log
-GUARD = const(16)
+SINCE_PA = const(5)  # pressure of the closed line, when that was first compared
+SINCE = const(6)  # ticks since; from SETTLE to 0 it settles
+WRONG = const(7)  # ticks in a row in which it was out of bounds, + LEAPT where it went there in one
+FELL_PA = const(8)  # where the pressure of the vented line last fell to
+FELL = const(9)  # ticks since
+FED = const(10)  # µJ that have come in for sure, and still no pressure
+LOW_PA = const(11)  # before a valve opened
+HIGH_PA = const(12)
+RUN = const(13)  # ticks in a row with a valve open
+DRY = const(14)  # ticks in a row of these without a sign of flow
+INFLOW = const(15)  # whether air has come in that was not asked for
+LOAD = const(16)  # of the budget, Pa ticks
+SPENT = const(17)  # whether it was used up and has not recovered
+SEEN = const(18)  # faults that are in the log
+GUARD = const(19)
 
 # The board's numbers for it.
 ALLOWED = const(0)  # µJ in a tick that may get lost
-LIMIT = const(1)  # µJ that may be missing, or surplus
-FROZEN = const(2)  # ticks
-WINDOW = const(3)  # ticks for which a closed line is compared with its beginning
-STALL = const(4)  # ticks in which a vented line must fall
-FLOWS = const(5)  # ticks after which a filling line must show flow
-DRY_MAX = const(6)
-APART_MAX = const(7)
-FREE_PA = const(8)  # pressure that costs no budget
-LOAD_MAX = const(9)  # Pa ticks
-NUMBERS = const(10)
+FROZEN = const(1)  # ticks
+WINDOW = const(2)  # ticks for which a closed line is compared with its beginning
+STALL = const(3)  # ticks in which a vented line must fall
+FLOWS = const(4)  # ticks after which an open valve must show flow
+DRY_MAX = const(5)
+FREE_PA = const(6)  # pressure that costs no budget
+LOAD_MAX = const(7)  # Pa ticks
+NUMBERS = const(8)
 
-CLOSED_PA = const(1200)  # a closed line keeps its pressure within
+LIMIT = const(120000)  # µJ that may be missing, or surplus
+CLOSED_PA = const(700)  # a closed line keeps its pressure within
+SETTLE = const(-2)  # quiet ticks before that is begun
 LEAP_PA = const(4500)  # more than any air brings about in a tick
 LEAPT = const(8)
 READINGS = const(2)  # in a row: one alone is noise
-APART_PA = const(9000)
+FED_PA = const(8000)  # which 4 mJ bring about
+FED_MAX = const(12000)  # µJ
+UNSURE_US = const(600)  # that a valve may be open less than is known
 NO_PA = const(1500)  # as good as nothing
 FLAT_PA = const(1000)  # below it a vented bubble is flat
 VENTED_PA = const(3000)  # below it a vented line need not fall
@@ -98,13 +103,11 @@ _MOVES = const(2)
 _PRESSED = const(4)
 _OVERFILLED = const(8)
 
-_LIMIT_UJ = const(60000)
 _ALLOWED_UJ_S = const(60000)
 _WINDOW_US = const(300000)
 _STALL_US = const(300000)
 _FLOWS_US = const(15000)
 _DRY_US = const(30000)
-_APART_US = const(40000)
 
 
 @micropython.viper
@@ -117,7 +120,7 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
         air = s[AIR]
         faults = s[FAULTS]
         if g[WAS_AIR] < 0:
-            g[SINCE_PA] = p
+            g[FELL_PA] = p
             g[WAS_AIR] = air
 
         # A sensor has noise.
@@ -149,80 +152,85 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
             g[MISSING] = 0
             g[SURPLUS] = 0
             g[RUN] = 0
-            g[APART] = 0
-            g[WRONG] = 0
+            g[FED] = 0
+            g[SINCE] = SETTLE
+            g[LOW_PA] = p
+            g[HIGH_PA] = p
             if p > FLAT_PA:
                 said |= _PRESSED
-            if g[SINCE] < 0:
-                g[SINCE] = 0
-            if p < VENTED_PA or p < g[SINCE_PA] - FALL_PA:
-                g[SINCE_PA] = p
-                g[SINCE] = 0
+            if p < VENTED_PA or p < g[FELL_PA] - FALL_PA:
+                g[FELL_PA] = p
+                g[FELL] = 0
+                if p < VENTED_PA and faults == 0:
+                    g[INFLOW] = 0
             elif s[LOST] == 0:
-                g[SINCE] = g[SINCE] + 1
-                if p > g[SINCE_PA] + FALL_PA:
+                g[FELL] = g[FELL] + 1
+                if p > g[FELL_PA] + FALL_PA:
                     g[INFLOW] = 1
-                if g[SINCE] >= w[STALL]:
+                if g[FELL] >= w[STALL]:
                     faults |= VALVE_STUCK
                     if g[INFLOW] and p > OVERFILLED_PA:
                         said |= _OVERFILLED
-            if p < VENTED_PA and faults == 0:
-                g[INFLOW] = 0
         else:
             said |= _PRESSED
             if s[STATUS] == MOVING:
                 said |= _MOVES
+            g[FELL_PA] = p
+            g[FELL] = 0
             if s[LOST] == 0:
+                quiet = 1 if s[BUSY] <= 0 else 0
                 # The book of air.
                 found = air - g[WAS_AIR] - s[DOSE]
                 lost = g[MISSING] - found - w[ALLOWED]
                 g[MISSING] = lost if lost > 0 else 0
                 more = g[SURPLUS] + found - w[ALLOWED]
                 g[SURPLUS] = more if more > 0 else 0
-                if lost > w[LIMIT]:
+                if lost > LIMIT:
                     faults |= LEAK
-                if more > w[LIMIT]:
+                if more > LIMIT:
                     faults |= VALVE_STUCK
                     g[INFLOW] = 1
 
-                # Table and sensor.
-                apart = s[HEIGHT + MODEL] - p
-                if apart > APART_PA or apart < 0 - APART_PA:
-                    g[APART] = g[APART] + 1
-                    if g[APART] >= w[APART_MAX]:
-                        if apart < 0:
-                            faults |= VALVE_STUCK
-                            g[INFLOW] = 1
-                        elif p < NO_PA:
-                            faults |= NO_AIR
-                        else:
-                            faults |= LEAK
-                else:
-                    g[APART] = 0
+                # Fed and still without pressure? Only what has come in for sure counts: dead times differ.
+                on = s[FILL_US]
+                if p > FED_PA:
+                    g[FED] = 0
+                elif on:
+                    if on < tick or g[RUN] == 0:
+                        on -= s[OPENS_US] - s[CLOSES_US] + UNSURE_US
+                    if on > 0:
+                        g[FED] = g[FED] + s[FLOW] * on // 16000
+                    if g[FED] > FED_MAX:
+                        faults |= LEAK if p > NO_PA else NO_AIR
 
-                # Filling: the tube's loss of pressure shows.
-                if s[FILL_US] == tick:
+                # Open: the tube's loss of pressure shows, this way or the other.
+                if quiet or p < g[LOW_PA]:
+                    g[LOW_PA] = p
+                if quiet or p > g[HIGH_PA]:
+                    g[HIGH_PA] = p
+                if s[FILL_US] == tick or s[VENT_US] == tick:
                     g[RUN] = g[RUN] + 1
                     if g[RUN] > w[FLOWS]:
-                        if p - g[BASE_PA] < (k[TUBE] * s[FLOW] >> 4) // 3:
+                        sign = p - g[LOW_PA] if s[FILL_US] else g[HIGH_PA] - p
+                        if sign < (k[TUBE] * s[FLOW] >> 4) // 3:
                             g[DRY] = g[DRY] + 1
                             if g[DRY] >= w[DRY_MAX]:
-                                faults |= NO_AIR
+                                faults |= NO_AIR if s[FILL_US] else VALVE_STUCK
                         else:
                             g[DRY] = 0
                 else:
                     g[RUN] = 0
                     g[DRY] = 0
-                    g[BASE_PA] = p
 
-                # Closed and quiet: the pressure stays.
-                if s[FILL_US] or s[VENT_US] or s[BUSY] > 0:
-                    g[SINCE] = -1
+                # Closed: the pressure stays.
+                if quiet == 0 or s[DOSE] != 0:
+                    g[SINCE] = SETTLE
                 else:
-                    if g[SINCE] < 0 or g[SINCE] >= w[WINDOW]:
+                    if g[SINCE] <= 0 or g[SINCE] >= w[WINDOW]:
                         g[SINCE_PA] = p
-                        g[SINCE] = 0
                         g[WRONG] = 0
+                        if g[SINCE] > 0:
+                            g[SINCE] = 0
                     g[SINCE] = g[SINCE] + 1
                     change = p - g[SINCE_PA]
                     if change > CLOSED_PA or change < 0 - CLOSED_PA:
@@ -274,18 +282,15 @@ class Guard:
         self._rows = array("i", bytearray(4 * GUARD * n))
         self._numbers = w = array("i", bytearray(4 * NUMBERS))
         w[ALLOWED] = _ALLOWED_UJ_S * board.TICK_US // 1000000
-        w[LIMIT] = _LIMIT_UJ
         w[FROZEN] = board.FROZEN_US // board.TICK_US
         w[WINDOW] = _WINDOW_US // board.TICK_US
         w[STALL] = _STALL_US // board.TICK_US
         w[FLOWS] = -(-_FLOWS_US // board.TICK_US)
         w[DRY_MAX] = _DRY_US // board.TICK_US
-        w[APART_MAX] = _APART_US // board.TICK_US
         w[FREE_PA] = board.BUDGET_FREE_PA
         self.set_budget(board.BUDGET_KPA_S)
         for at in range(0, n * GUARD, GUARD):
             self._rows[at + WAS_AIR] = -1
-            self._rows[at + SINCE] = -1
 
     def set_budget(self, kpa_s):
         """How much pressure times time above the threshold each bubble may have."""
