@@ -5,8 +5,8 @@ python tools/fault_report.py --shows 0            # only how soon faults are fou
 python tools/fault_report.py --sheets 0           # only false alarms
 
 Each fault is given to one bubble in each situation, on sheets that match the tables and on sheets that do not. A
-fault without any effect as long as nothing moves (a fill valve that does not open, say) is followed by a move after
-a second, and timed from there. The same arguments give the same figures.
+fault without any effect as long as nothing moves (a fill valve that does not open, say) is followed by moves, and
+timed from the first pulse that it spoils. The same arguments give the same figures.
 """
 
 import argparse
@@ -118,26 +118,19 @@ def inject(url: str, fault: Injected, situation: str, found: Found) -> None:
         value = fault.value
         if value is None:
             value = float(board.plant.sense()[VICTIM])
-        begin = board.time
         board.inject(fault.name, VICTIM, value)
-        time = _wait(skin, begin)
+        time = _wait(skin, fault)
         if time is not None:
             found.times.append(time)
         else:
-            begin = board.time
-            if start is not None and then != "stop":
-                show(12.0 if start < 10 else 8.0)
+            for move in (13.0, 7.0, 0.0):
+                show(move)
+                time = _wait(skin, fault)
+                if time is not None:
+                    found.later.append(time)
+                    break
             else:
-                show(10.0)
-            time = _wait(skin, begin)
-            if time is None:
-                skin.vent()
-                begin = board.time
-                time = _wait(skin, begin)
-            if time is None:
                 found.missed += 1
-            else:
-                found.later.append(time)
         skin.sleep(0.6)
         for entry in skin.fault_log():
             if entry.bubble is None:
@@ -148,14 +141,30 @@ def inject(url: str, fault: Injected, situation: str, found: Found) -> None:
                 found.others += 1
 
 
-def _wait(skin: bs.Skin, begin: float) -> float | None:
+def _spoils(fault: Injected, fill: float, vent: float, tick: float) -> bool:
+    """Whether what the valves are told makes the fault felt."""
+    wanted = {
+        ("fill_stuck", 1.0): fill < tick,
+        ("fill_stuck", -1.0): fill > 0,
+        ("vent_stuck", 1.0): vent < tick,
+        ("vent_stuck", -1.0): vent > 0,
+    }
+    return wanted.get((fault.name, fault.value or 0.0), True)
+
+
+def _wait(skin: bs.Skin, fault: Injected) -> float | None:
+    """Seconds until the victim has a fault, from the first pulse that was spoilt by it; None where it gets none."""
     board = skin.simulated
     assert board is not None
-    while board.time < begin + PATIENCE:
+    felt = None
+    end = board.time + PATIENCE
+    while board.time < end:
+        if felt is None and _spoils(fault, *board.pulses[VICTIM], skin.info.tick):
+            felt = board.time
         skin.sleep(skin.info.tick)
         for entry in skin.fault_log():
             if entry.bubble == VICTIM:
-                return entry.time - begin
+                return entry.time - (entry.time if felt is None else felt)
     return None
 
 

@@ -56,7 +56,7 @@ SURPLUS = const(3)  # µJ that are there and were not brought
 SAME = const(4)  # ticks for which the sensor has said the same
 SINCE_PA = const(5)  # pressure of the closed line, when that was first compared
 SINCE = const(6)  # ticks since; from SETTLE to 0 it settles
-WRONG = const(7)  # ticks in a row in which it was out of bounds, + LEAPT where it went there in one
+WRONG = const(7)  # ticks in a row in which it was out of bounds
 FELL_PA = const(8)  # where the pressure of the vented line last fell to
 FELL = const(9)  # ticks since
 FED = const(10)  # µJ that have come in for sure, and still no pressure
@@ -68,7 +68,10 @@ INFLOW = const(15)  # whether air has come in that was not asked for
 LOAD = const(16)  # of the budget, Pa ticks
 SPENT = const(17)  # whether it was used up and has not recovered
 SEEN = const(18)  # faults that are in the log
-GUARD = const(19)
+GIVEN = const(19)  # µJ that have come in for sure since the last measurement
+TAKEN = const(20)  # µJ let out while there is surplus
+EMPTIED = const(21)  # whether the pressure has dropped as no valve makes it drop
+GUARD = const(22)
 
 # The board's numbers for it.
 ALLOWED = const(0)  # µJ in a tick that may get lost
@@ -81,14 +84,14 @@ FREE_PA = const(6)  # pressure that costs no budget
 LOAD_MAX = const(7)  # Pa ticks
 NUMBERS = const(8)
 
-LIMIT = const(120000)  # µJ that may be missing, or surplus
+MISSING_MAX = const(90000)  # µJ
+SURPLUS_MAX = const(110000)
 CLOSED_PA = const(700)  # a closed line keeps its pressure within
 SETTLE = const(-2)  # quiet ticks before that is begun
-LEAP_PA = const(4500)  # more than any air brings about in a tick
-LEAPT = const(8)
 READINGS = const(2)  # in a row: one alone is noise
 FED_PA = const(8000)  # which 4 mJ bring about
 FED_MAX = const(12000)  # µJ
+DROP_PA = const(10000)
 UNSURE_US = const(600)  # that a valve may be open less than is known
 NO_PA = const(1500)  # as good as nothing
 FLAT_PA = const(1000)  # below it a vented bubble is flat
@@ -103,7 +106,7 @@ _MOVES = const(2)
 _PRESSED = const(4)
 _OVERFILLED = const(8)
 
-_ALLOWED_UJ_S = const(60000)
+_ALLOWED_UJ_S = const(50000)
 _WINDOW_US = const(300000)
 _STALL_US = const(300000)
 _FLOWS_US = const(15000)
@@ -124,8 +127,8 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
             g[WAS_AIR] = air
 
         # A sensor has noise.
-        leap = p - g[WAS_PA]
-        if leap or s[LOST]:
+        fell = g[WAS_PA] - p
+        if fell or s[LOST]:
             g[SAME] = 0
             g[WAS_PA] = p
         else:
@@ -153,6 +156,9 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
             g[SURPLUS] = 0
             g[RUN] = 0
             g[FED] = 0
+            g[GIVEN] = 0
+            g[TAKEN] = 0
+            g[EMPTIED] = 0
             g[SINCE] = SETTLE
             g[LOW_PA] = p
             g[HIGH_PA] = p
@@ -179,29 +185,50 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
             g[FELL] = 0
             if s[LOST] == 0:
                 quiet = 1 if s[BUSY] <= 0 else 0
-                # The book of air.
-                found = air - g[WAS_AIR] - s[DOSE]
-                lost = g[MISSING] - found - w[ALLOWED]
-                g[MISSING] = lost if lost > 0 else 0
-                more = g[SURPLUS] + found - w[ALLOWED]
-                g[SURPLUS] = more if more > 0 else 0
-                if lost > LIMIT:
-                    faults |= LEAK
-                if more > LIMIT:
-                    faults |= VALVE_STUCK
-                    g[INFLOW] = 1
-
-                # Fed and still without pressure? Only what has come in for sure counts: dead times differ.
+                # For sure: dead times differ, so a valve may be open for less than is known.
                 on = s[FILL_US]
+                if on and (on < tick or g[RUN] == 0):
+                    on -= s[OPENS_US] - s[CLOSES_US] + UNSURE_US
+                fed = s[FLOW] * on // 16000 if on > 0 else 0
+
+                # The book of air. Missing is at most what has come in for sure: the rest is bad metering.
+                found = air - g[WAS_AIR] - s[DOSE]
+                lost = 0 - found
+                if lost > 0:
+                    if lost > g[GIVEN]:
+                        lost = g[GIVEN]
+                    g[GIVEN] = g[GIVEN] - lost
+                lost += g[MISSING] - w[ALLOWED]
+                g[MISSING] = lost if lost > 0 else 0
+                if quiet:
+                    g[GIVEN] = 0
+                g[GIVEN] = g[GIVEN] + fed
+                more = g[SURPLUS] + found - w[ALLOWED]
+                if more <= 0:
+                    more = 0
+                    g[TAKEN] = 0
+                elif s[DOSE] < 0:
+                    g[TAKEN] = g[TAKEN] - s[DOSE]
+                g[SURPLUS] = more
+                if lost > MISSING_MAX:
+                    faults |= LEAK
+                if more > SURPLUS_MAX:
+                    faults |= VALVE_STUCK
+                    if more > g[TAKEN] + SURPLUS_MAX // 4:  # else it may be that nothing was let out
+                        g[INFLOW] = 1
+
+                # No valve empties a bubble in a tick.
                 if p > FED_PA:
-                    g[FED] = 0
-                elif on:
-                    if on < tick or g[RUN] == 0:
-                        on -= s[OPENS_US] - s[CLOSES_US] + UNSURE_US
-                    if on > 0:
-                        g[FED] = g[FED] + s[FLOW] * on // 16000
-                    if g[FED] > FED_MAX:
-                        faults |= LEAK if p > NO_PA else NO_AIR
+                    g[EMPTIED] = 0
+                elif g[EMPTIED]:
+                    faults |= LEAK
+                elif fell > DROP_PA:
+                    g[EMPTIED] = 1
+
+                # Fed and still without pressure?
+                g[FED] = g[FED] + fed if p < FED_PA else 0
+                if g[FED] > FED_MAX:
+                    faults |= LEAK if p > NO_PA else NO_AIR
 
                 # Open: the tube's loss of pressure shows, this way or the other.
                 if quiet or p < g[LOW_PA]:
@@ -234,12 +261,10 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                     g[SINCE] = g[SINCE] + 1
                     change = p - g[SINCE_PA]
                     if change > CLOSED_PA or change < 0 - CLOSED_PA:
-                        g[WRONG] = g[WRONG] + 1 if g[WRONG] or leap <= LEAP_PA else LEAPT + 1
-                        if g[WRONG] & (LEAPT - 1) >= READINGS:
+                        g[WRONG] = g[WRONG] + 1
+                        if g[WRONG] >= READINGS:
                             if change < 0:
                                 faults |= LEAK
-                            elif g[WRONG] >= LEAPT:
-                                faults |= SENSOR_STUCK
                             else:
                                 faults |= VALVE_STUCK
                                 g[INFLOW] = 1

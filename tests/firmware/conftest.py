@@ -42,6 +42,7 @@ class Hands:
         self.pulses = None
         self.pump = self.dump = None
         self.in_vent = False
+        self.noise = 0
         self.full = False  # no room for what is sent
         self.broken = set()  # names of hands that raise
 
@@ -50,8 +51,11 @@ class Hands:
             raise OSError(f"{name} is broken")
 
     def sense(self, counts):
+        """A sensor has noise: now and then a count more, where that is none of the ends."""
         self._use("sense")
-        counts[:] = type(counts)("H", self.counts)
+        self.noise = (self.noise + 1) % 8
+        more = self.noise == 0
+        counts[:] = type(counts)("H", [count + (more and 8 < count < 4000) for count in self.counts])
 
     def act(self, pulses, pump, dump):
         self._use("act")
@@ -88,7 +92,9 @@ class Rig:
         self._sequence = 0
 
     def tick(self, ticks=1):
+        """Let periods pass, with a host that lives."""
         for _ in range(ticks):
+            self.app.heard()
             self.app.tick()
 
     def heard(self):

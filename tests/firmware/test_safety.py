@@ -178,14 +178,14 @@ def test_stop_closes_and_vent_opens_all_valves(rig):
     rig.tick()
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
     assert set(rig.state()["status"]) == {messages.RESTING}
-    assert rig.app.mode == messages.VENTED
+    assert rig.app.mode == messages.MODE_VENTING
 
 
 def test_the_board_starts_vented(rig):
     assert rig.hands.in_vent
     rig.tick(3)
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
-    assert rig.app.mode == messages.VENTED
+    assert rig.app.mode == messages.IDLE
 
 
 # Exceptions.
@@ -197,7 +197,7 @@ def test_an_exception_in_the_tick_vents(rig, hand):
     rig.hands.broken.add(hand)
     rig.tick()
     assert rig.hands.in_vent
-    assert rig.app.mode == messages.VENTED
+    assert rig.app.mode == messages.MODE_VENTING
     assert rig.app.exceptions == 1
 
     rig.hands.broken.clear()
@@ -214,7 +214,7 @@ def test_a_board_that_fails_in_every_tick_still_answers(rig7, hand):
     rig7.show(12000)
     rig7.tick()
     assert rig7.hands.in_vent
-    assert rig7.app.mode == messages.VENTED
+    assert rig7.app.mode == messages.MODE_VENTING
 
 
 def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
@@ -226,7 +226,7 @@ def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
     monkeypatch.setattr(rig7.app, "show", fail)
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == messages.FAULTED
     assert rig7.hands.in_vent
-    assert rig7.app.mode == messages.VENTED
+    assert rig7.app.mode == messages.MODE_VENTING
     assert rig7.ask("PING", (1,)).id == messages.PING | messages.REPLY
 
     # A failure later, with no request at hand, has nobody to be told to.
@@ -258,7 +258,7 @@ def test_a_broken_link_does_not_stop_the_tick(rig7, hand):
     rig7.hands.to_device = b""
     answer = rig7.ask("INFO")
     assert answer["exceptions"] >= 1
-    assert answer["mode"] == messages.VENTED
+    assert answer["mode"] == messages.MODE_VENTING
     assert answer["ticks"] == rig7.app.ticks - 1
 
 
