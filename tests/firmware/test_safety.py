@@ -27,7 +27,7 @@ def vented(rig, bubble):
 def assert_isolated(rig, bubble, fault):
     """This bubble is vented for its fault, all others are controlled as before."""
     state = rig.state()
-    assert state["faults"][bubble] == fault
+    assert state["faults"][bubble] & fault
     assert state["status"][bubble] == messages.FAULT
     assert vented(rig, bubble)
     others = [other for other in range(rig.board.BUBBLES) if other != bubble]
@@ -63,13 +63,14 @@ def test_a_wrong_reading_isolates_its_bubble_within_two_ticks(rig, wrong, fault)
     assert_isolated(rig, bubble, fault)
 
     # It latches: a sensor that is well again changes nothing, nor does another shape.
-    rig.sense(bubble, HELD_PA)
+    rig.sense(bubble, 0)  # for it is vented
     rig.tick(20)
     rig.show(HELD_UM)
     rig.tick(20)
     assert_isolated(rig, bubble, fault)
 
     # Cleared, it is controlled again.
+    rig.sense(bubble, HELD_PA)
     rig.ask("CLEAR")
     rig.tick(40)
     assert not vented(rig, bubble)
@@ -111,18 +112,18 @@ def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
         assert rig.write_table(bubble, [(5000, 0), (14000, 40000)] if bubble == 0 else [(5000, 0), (14000, 34000)])
     rig.app.tables.swap()
     rig.app.bubbles.use_tables()
-    rig.hands.counts[-1] = board.SUPPLY_ZERO + 25000 // board.SUPPLY_PA_PER_COUNT
+    rig.hands.counts[-1] = board.SUPPLY_ZERO + 27000 // board.SUPPLY_PA_PER_COUNT
     rig.sense(0, 26000)
     for bubble in range(1, board.BUBBLES):
         rig.sense(bubble, 18900)  # where their table has 10 mm
-    rig.tick(40)
+    rig.tick(20)
     rig.show(14000, *[10000] * (board.BUBBLES - 1))
-
     rig.tick()
 
     open_ticks = int(rig.pulse(0)[0] == board.TICK_US)
     while not vented(rig, 0):
         rig.tick()
+        rig.sense(0, 26600)  # what flows shows in the tube
         open_ticks += rig.pulse(0)[0] == board.TICK_US
         assert open_ticks * board.TICK_US <= board.FILL_MAX_US, "the valve is open for longer than allowed"
     assert open_ticks * board.TICK_US == board.FILL_MAX_US
@@ -169,6 +170,9 @@ def test_clearing_all_the_time_does_not_disarm_the_guard(rig7, wrong, fault):
 def test_stop_closes_and_vent_opens_all_valves(rig):
     hold(rig)
     rig.show(14000)
+    rig.tick(2)
+    for bubble in range(rig.board.BUBBLES):
+        rig.sense(bubble, HELD_PA + 3000)  # what flows shows in the tube
     rig.tick(10)
     rig.ask("STOP")
     rig.tick()  # decided in the tick after the request

@@ -45,7 +45,7 @@ def encode(name: str, sequence: int, fixed: Sequence[int] = (), repeated: Sequen
     message = codec.BY_NAME[name]
     values = array("i", (_signed(value) for value in fixed))
     for row in repeated:
-        values.extend(map(int, row))
+        values.extend(map(_signed, row))
     frame = bytearray(framing.FRAME_MAX)
     end = message.pack(values, len(repeated), frame, framing.Decoder.PAYLOAD_AT)
     framing.put_header(frame, message.id, sequence)
