@@ -199,7 +199,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--board", action="append", help="wristband7 or wristband19 (default: both)")
     parser.add_argument("--sheets", type=int, default=2, help="with spread, for each fault (default: 2)")
-    parser.add_argument("--shows", type=int, default=200, help="without faults, for each board and spread (default: 200)")
+    parser.add_argument(
+        "--shows", type=int, default=200, help="without faults, for each board and spread (default: 200)"
+    )
     parser.add_argument("--spread", type=float, default=0.1)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--fault", help="only faults whose text has this in it")
@@ -230,7 +232,9 @@ def main(arguments: list[str] | None = None) -> int:
             for spread, sheets in ((0.0, 2), (options.spread, 5)):
                 shows, alarms = false_alarms(name, spread, sheets, options.shows, options.seed)
                 wrong += alarms
-                console.print(f"{name}, spread {spread:g}: {len(alarms)} false alarms in {shows} shows on {sheets} sheets")
+                console.print(
+                    f"{name}, spread {spread:g}: {len(alarms)} false alarms in {shows} shows on {sheets} sheets"
+                )
     for line in wrong:
         console.print(line)
     return 1 if wrong else 0

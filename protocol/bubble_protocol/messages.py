@@ -66,7 +66,11 @@ FAULTS = (
     (OVERPRESSURE, "overpressure", "pressure above the board's limit"),
     (SENSOR_LOST, "sensor_lost", "the sensor reads the end of its range: broken wire or missing chip"),
     (VALVE_TIME, "valve_time", "the fill valve was open longer than the board allows at a time"),
-    (LEAK, "leak", "air escapes: a leak, a bubble off its barb, a vent valve that does not close; or a sensor that has fallen"),
+    (
+        LEAK,
+        "leak",
+        "air escapes: a leak, a bubble off its barb, a vent valve that does not close; or a sensor that has fallen",
+    ),
     (NO_AIR, "no_air", "air does not arrive: a fill valve that does not open, a kinked or lost tube"),
     (
         VALVE_STUCK,

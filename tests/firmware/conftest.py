@@ -151,6 +151,12 @@ def rig(request):
     return Rig(request.param)
 
 
+@pytest.fixture(scope="session")
+def new_rig():
+    """Makes rigs, for tests that need one for each example."""
+    return Rig
+
+
 @pytest.fixture
 def rig7():
     return Rig("wristband7")

@@ -112,7 +112,7 @@ def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
         assert rig.write_table(bubble, [(5000, 0), (14000, 40000)] if bubble == 0 else [(5000, 0), (14000, 34000)])
     rig.app.tables.swap()
     rig.app.bubbles.use_tables()
-    rig.hands.counts[-1] = board.SUPPLY_ZERO + 27000 // board.SUPPLY_PA_PER_COUNT
+    rig.hands.counts[-1] = board.SUPPLY_ZERO + 29000 // board.SUPPLY_PA_PER_COUNT
     rig.sense(0, 26000)
     for bubble in range(1, board.BUBBLES):
         rig.sense(bubble, 18900)  # where their table has 10 mm
@@ -123,7 +123,7 @@ def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
     open_ticks = int(rig.pulse(0)[0] == board.TICK_US)
     while not vented(rig, 0):
         rig.tick()
-        rig.sense(0, 26600)  # what flows shows in the tube
+        rig.sense(0, 28300)  # what flows shows in the tube
         open_ticks += rig.pulse(0)[0] == board.TICK_US
         assert open_ticks * board.TICK_US <= board.FILL_MAX_US, "the valve is open for longer than allowed"
     assert open_ticks * board.TICK_US == board.FILL_MAX_US
