@@ -50,7 +50,7 @@ def test_health_of_a_board_at_rest(skin):
     assert health.mode == "idle"
     assert health.exceptions == 0
     assert health.frames_bad == before.frames_bad
-    assert health.frames_good == before.frames_good + 1
+    assert health.frames_good > before.frames_good
     assert health.late_ticks == before.late_ticks
     assert 55 < health.supply_kpa < 65
     assert skin.faults() == {}

@@ -373,7 +373,7 @@ MESSAGES = (
     (
         FAULTS_READ,
         "FAULTS_READ",
-        (("after", U32, "", 0, 0x3FFFFFFF, "entries with a greater id; 0: from the oldest"),),
+        (("after", I32, "", 0, 0x3FFFFFFF, "entries with a greater id; 0: from the oldest"),),
         (),
         "what has gone wrong, and when?",
     ),
@@ -397,7 +397,7 @@ MESSAGES = (
     (
         FAULTS_ACK,
         "FAULTS_ACK",
-        (("up_to", U32, "", 0, 0x3FFFFFFF, "id of the newest entry that has been seen"),),
+        (("up_to", I32, "", 0, 0x3FFFFFFF, "id of the newest entry that has been seen"),),
         (),
         "acknowledge: forget the faults up to this entry; those that still are there fault again",
     ),

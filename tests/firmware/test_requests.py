@@ -90,7 +90,7 @@ def test_a_payload_of_the_wrong_length_is_refused(rig):
             low = message.fixed_size
             high = framing.PAYLOAD_MAX if message.stride else low
             wrong = {low - 1, low + 1, 247} - {-1} if not message.stride else {low - 1, low + 1}
-            for size in wrong:
+            for size in wrong - {-1}:
                 assert raw(rig, message.id, bytes(size)) == (messages.WRONG_LENGTH, 0, WHOLE, size, low, high)
 
 
@@ -112,7 +112,7 @@ def test_hello_introduces_the_board(rig):
         "height_max_um": board.HEIGHT_MAX_UM,
         "pressure_max_pa": board.PRESSURE_MAX_PA,
         "window": 1,
-        "capabilities": 0,
+        "capabilities": 2,
         "tables_crc": zlib.crc32(np.array(nominal.KNOTS, "<u2").tobytes() * board.BUBBLES),
     }
 

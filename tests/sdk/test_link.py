@@ -88,7 +88,8 @@ def test_nothing_gets_through_and_the_call_ends_in_time(tapped):
         skin.state()
     assert tap.now() - begin == pytest.approx(1.0, abs=0.02)
     requests = list(Reader().feed(bytes(tap.sent[before:])))
-    assert [request.id for request in requests] == [messages.STATE] * round(1.0 / RESEND)
+    asked = [request.id for request in requests if request.id != messages.PING]  # which keeps the link alive
+    assert asked == [messages.STATE] * round(1.0 / RESEND)
     assert len({request.sequence for request in requests}) == 1, "a resent request keeps its number"
 
 
@@ -144,7 +145,7 @@ def test_telemetry_ends_with_its_iterator(tapped):
     skin.sleep(0.1)
     before = len(tap.received)
     skin.sleep(1.0)
-    assert len(tap.received) == before
+    assert not [message for message in Reader().feed(bytes(tap.received[before:])) if message.id == messages.TELEMETRY]
 
 
 def test_telemetry_in_pieces_is_whole(tapped):

@@ -112,7 +112,7 @@ def test_a_bubble_that_still_empties_or_has_not_begun_to_rise_is_not_settled():
 
 
 def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
-    (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 99), [(5000, 0, 0, 99, 128)]))
+    (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 99), [(5000, 0, 0, 99, 0)]))
     state = State.of(reply, 0.005)
     assert (state.mode, state.status, state.faults) == ("unknown", ("unknown",), ((),))
     assert not state.settled
@@ -169,6 +169,10 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
             "The wristband refused SHOW: the emergency stop is pressed, or its loop is broken: everything vents. "
             "Mend the cause, then `clear_faults()`.",
         ),
+        (
+            error(messages.NO_SETTING, asked=9, low=0, high=2),
+            "The wristband refused SHOW: it has no setting 9; they are numbered 0 to 2. Update its firmware.",
+        ),
         (error(200), "The wristband refused SHOW with error 200."),
     ],
 )
@@ -179,7 +183,7 @@ def test_every_refusal_has_its_sentence(received, sentence):
 def test_every_error_of_the_schema_is_explained():
     explained = {messages.UNKNOWN_MESSAGE, messages.WRONG_LENGTH, messages.OUT_OF_RANGE, messages.WRONG_COUNT}
     explained |= {messages.BAD_TABLE, messages.BAD_CRC, messages.NO_COMMON_PROTOCOL, messages.FAULTED}
-    explained |= {messages.BOARD_FAULT}
+    explained |= {messages.BOARD_FAULT, messages.NO_SETTING}
     assert explained == {code for code, _, _ in messages.ERRORS}
 
 

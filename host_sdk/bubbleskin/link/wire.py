@@ -102,6 +102,9 @@ class Reader:
         stride = message.stride_values
         rows = np.array(self._values[at : at + count * stride], dtype=np.int64).reshape(count, stride)
         columns = {field[0]: rows[:, index] for index, field in enumerate(message.repeated)}
+        for name, kind, *_ in message.repeated:
+            if kind == messages.U32:
+                columns[name] &= 0xFFFFFFFF
         return Received(decoder.message_id, decoder.sequence, fields, columns)
 
 
@@ -133,6 +136,8 @@ def explain(error: Received) -> str:
     if code == messages.BOARD_FAULT:
         faults = [sentence for bit, _, sentence in messages.BOARD_FAULTS if asked & bit & messages.VENTING]
         return f"The wristband refused {name}: {'; '.join(faults)}. Mend the cause, then `clear_faults()`."
+    if code == messages.NO_SETTING:
+        return f"The wristband refused {name}: it has no setting {asked}; they are numbered {low} to {high}. Update its firmware."
     if code == messages.UNKNOWN_MESSAGE:
         return f"The wristband does not know {name}: its firmware is older than this SDK. Update the firmware."
     return f"The wristband refused {name} with error {code}."
