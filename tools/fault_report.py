@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
 import bubbleskin as bs
 
@@ -84,10 +83,10 @@ class Found:
         if self.later:
             parts.append(f"move + {max(self.later):.2f}")
         if self.missed:
-            parts.append(f"not: {self.missed}")
+            parts.append("–" if self.missed > 1 or not parts else f"not on {self.missed} sheet")
         if self.others:
             parts.append(f"others: {self.others}")
-        return ", ".join(parts) + "\n" + ", ".join(sorted(self.names | self.board))
+        return "; ".join([", ".join(parts), ", ".join(sorted(self.names | self.board))]).strip("; ")
 
 
 def inject(url: str, fault: Injected, situation: str, found: Found) -> None:
@@ -211,7 +210,8 @@ def main(arguments: list[str] | None = None) -> int:
     boards = options.board or ["wristband7", "wristband19"]
     faults = [fault for fault in FAULTS if not options.fault or options.fault in fault.text]
     for name in boards if options.sheets else []:
-        table = Table("fault", *SITUATIONS, title=f"{name}: s until isolated, the longest; as what", show_lines=True)
+        lines = [f"{name}: s until isolated, the longest; as what", "", "| fault | " + " | ".join(SITUATIONS) + " |"]
+        lines.append("|---" * (1 + len(SITUATIONS)) + "|")
         for fault in track(faults, name, console=Console(stderr=True), transient=True):
             cells = []
             for situation in SITUATIONS:
@@ -222,8 +222,9 @@ def main(arguments: list[str] | None = None) -> int:
                     inject(url, fault, situation, found)
                 late += sum(time > TARGET for time in found.times + found.later)
                 cells.append(found.text())
-            table.add_row(fault.text, *cells)
-        console.print(table)
+            lines.append(f"| {fault.text} | " + " | ".join(cells) + " |")
+        sys.stdout.write("\n".join([*lines, "", ""]))
+        sys.stdout.flush()
     if options.sheets:
         console.print(f"{late} of them later than {TARGET:g} s")
     wrong: list[str] = []

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="arg-type"
 """What can be set over the wire, within the limits of the board. The schema lists it."""
 
 from array import array
