@@ -47,7 +47,7 @@ def test_health_of_a_board_at_rest(skin):
     skin.sleep(0.5)
     health = skin.health()
     assert health.time - before.time == pytest.approx(0.5, abs=0.1)
-    assert health.mode == "vented"
+    assert health.mode == "idle"
     assert health.exceptions == 0
     assert health.frames_bad == before.frames_bad
     assert 1 <= health.frames_good - before.frames_good <= 20, "and what keeps the link alive"
@@ -63,7 +63,7 @@ def test_states_follow_each_other(skin):
     for state in states:
         assert state.height_mm.shape == state.pressure_kpa.shape == state.target_mm.shape == (skin.info.bubbles,)
         assert len(state.status) == len(state.faults) == skin.info.bubbles
-        assert state.mode == "vented"
+        assert state.mode == "idle"
         assert set(state.status) == {"resting"}
 
 

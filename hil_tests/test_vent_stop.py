@@ -16,7 +16,7 @@ def test_vent_empties_every_bubble_within_a_second(skin):
     skin.sleep(1.0)
     for _ in range(20):
         state = skin.state()
-        assert state.mode == "vented"
+        assert state.mode == "idle"
         assert set(state.status) == {"resting"}
         assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
         if skin.simulated:
@@ -35,7 +35,7 @@ def test_vent_ends_a_show_that_is_under_way(skin, after):
     skin.vent()
     skin.sleep(1.0)
     state = skin.state()
-    assert state.mode == "vented"
+    assert state.mode == "idle"
     assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
 
 
@@ -47,7 +47,7 @@ def test_vent_ends_a_ramp(skin):
     skin.vent()
     skin.sleep(4.0)
     state = skin.state()
-    assert state.mode == "vented"
+    assert state.mode == "idle"
     assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
 
 
@@ -113,4 +113,4 @@ def test_vent_and_stop_can_be_said_twice(skin):
     assert skin.state().mode == "holding"
     skin.vent()
     skin.vent()
-    assert skin.state().mode == "vented"
+    assert skin.state().mode == "idle"

@@ -25,21 +25,34 @@
 import gc
 from array import array
 
+from bubble_firmware import guard, safety
 from bubble_firmware.bubbles import Bubbles
+from bubble_firmware.faultlog import FaultLog
 from bubble_firmware.figures import Figures
 from bubble_firmware.selftest import SelfTest
 from bubble_firmware.sequence import Player
 from bubble_firmware.sequence_requests import SequenceRequests
 from bubble_firmware.session import Session
+from bubble_firmware.settings import Settings
 from bubble_firmware.store import Store
 from bubble_firmware.store_requests import StoreRequests
 from bubble_firmware.supply import Supply
 from bubble_firmware.table import Tables
-from bubble_firmware.ticks import bins, count
-from bubble_protocol.messages import ACTIVE, EXCEPTION, HOLDING, SELF_TEST, SUPPLY_LOST, VENTED, VENTING
+from bubble_firmware.ticks import bins, count, later
+from bubble_protocol import messages
+from bubble_protocol.messages import (
+    ACTIVE,
+    ESTOP,
+    EXCEPTION,
+    HOLDING,
+    IDLE,
+    OVERFILLED,
+    SELF_TEST,
+    SUPPLY_LOST,
+    VENTING,
+)
 
 _TIDY_MASK = 1023  # ticks
-_TICKS_MASK = (1 << 30) - 1  # more, and counting allocates: ticks begin again after 62 days
 
 
 LISTEN = -1
@@ -53,8 +66,7 @@ class App:
         self.board = board
         self.hands = hands
         self.ticks = -1  # the first is 0
-        self.mode = VENTED
-        self.faults = hands.boot_faults
+        self.faults = 0
         self.exceptions = 0
         self.tick_worst_us = 0
         self.work_us = board.TICK_US // 50
@@ -65,8 +77,17 @@ class App:
         self.bubbles = Bubbles(board, self.tables)
         self.supply = Supply(board)
         self.self_test = SelfTest(board, hands.self_test)
+        self.safety = safety.Safety(board)
+        self.settings = Settings(board)
+        self.guard = guard.Guard(board, self.bubbles)
+        self.log = FaultLog()
+        self._fault_id = 0  # of the board's newest fault
+        self._fault_ids = array("i", bytearray(4 * board.BUBBLES))  # of each bubble's
+        self._moving = 0
+        self.fault(hands.boot_faults)
         self.figures = Figures(board, self.bubbles)
         self.store = Store(self, getattr(hands, "flash", None))
+        self.use_settings()
         self.player = Player(self)
         self.session = Session(self)
         StoreRequests(self, self.session)
@@ -76,7 +97,7 @@ class App:
 
     def tick(self):
         """One period. Whatever goes wrong in it, the outputs go to vent and the next one is tried."""
-        self.ticks = self.ticks + 1 & _TICKS_MASK
+        self.ticks = later(self.ticks, 1)
         try:
             self._control()
         except Exception:
@@ -95,6 +116,11 @@ class App:
             self._fail()
             self.session.fail()
 
+    @property
+    def mode(self):
+        """The state of the board, one of MODES."""
+        return self.safety.mode
+
     def _control(self):
         hands = self.hands
         supply = self.supply
@@ -105,20 +131,32 @@ class App:
         supply.sense(counts[bubbles.count])
         if hands.alarms or supply.lost:
             self._alarm(hands.alarms)
+        silence = self.safety.watch(self._moving)
+        if silence != safety.NOTHING:
+            self._silence(silence)
         if self.player.running:
             self.player.tick()
-        bubbles.step(counts, supply.pressure_pa, self.mode)
-        if self.self_test.running:
+        bubbles.step(counts, supply.pressure_pa, self.safety.drive)
+        found = self.guard.check()
+        self._moving = found & guard.MOVES
+        self.safety.settle(found & guard.PRESSED)
+        if found & (guard.NEW | guard.OVERFILLED):
+            self._found(found)
+        self.guard.spare(supply.pressure_pa)
+        if self.safety.mode == messages.BOOT:
             self._test()
-        hands.act(bubbles.pulses, supply.pump, supply.dump)
-        hands.alive(self.mode, self.faults)
+        if self.faults & OVERFILLED:  # nothing more into it
+            hands.act(bubbles.pulses, 0, 1)
+        else:
+            hands.act(bubbles.pulses, supply.pump, supply.dump)
+        hands.alive(self.safety.mode, self.faults)
 
     def _talk(self):
         hands = self.hands
         self.session.poll()
         if self.player.waiting_news:
             self.sequence_requests.tell()
-        if not self.ticks & _TIDY_MASK and self.mode == VENTED:
+        if not self.ticks & _TIDY_MASK and self.safety.mode == IDLE:
             hands.tidy()
         spent = hands.phase_us()
         count(self.worked, spent, self.work_us)
@@ -128,51 +166,112 @@ class App:
     def _fail(self):
         self.hands.vent()  # first of all
         self.exceptions += 1
-        self.faults |= EXCEPTION
-        self.vent()
+        self.fault(EXCEPTION)
+        self.safety.take(safety.FAILED)
+        self.bubbles.rest()
 
     def _alarm(self, alarms):
         if self.supply.lost:
             alarms |= SUPPLY_LOST
-        self.faults |= alarms
+        self.fault(alarms)
         if alarms & VENTING:
             self.hands.vent()
             self.self_test.skip()
-            if self.mode != VENTED:
-                self.vent()
+            if self.safety.take(safety.ESTOP if alarms & ESTOP else safety.FAULT):
+                self.bubbles.rest()
+
+    def _silence(self, event):
+        if self.safety.take(event):
+            ms = self.safety.silent * (self.board.TICK_US // 1000)
+            self.log.add(self.ticks, messages.HOST_SILENT, messages.BOARD, ms)
+            if self.safety.mode == HOLDING:
+                self.bubbles.hold()
+            else:
+                self.bubbles.rest()
+
+    def _found(self, found):
+        bubbles = self.bubbles
+        for i in range(bubbles.count):
+            new = self.guard.unseen(i)
+            bit = 1
+            while new:
+                if new & 1:
+                    self._fault_ids[i] = self.log.add(self.ticks, bit, i, bubbles.pressure_pa(i))
+                new >>= 1
+                bit <<= 1
+        if found & guard.OVERFILLED:
+            self._alarm(OVERFILLED)
+
+    def fault(self, bits):
+        """The board has these faults: those that are new are latched and written down."""
+        new = bits & ~self.faults
+        self.faults |= bits
+        bit = 1
+        while new:
+            if new & 1:
+                self._fault_id = self.log.add(self.ticks, bit, messages.BOARD, self.supply.pressure_pa)
+            new >>= 1
+            bit <<= 1
 
     def _test(self):
-        self.self_test.tick(self.bubbles, self.supply)
-        if self.self_test.failed:
-            self.faults |= SELF_TEST
+        if self.self_test.running:
+            self.self_test.tick(self.bubbles, self.supply)
+        if not self.self_test.running:
+            if self.self_test.failed:
+                self.fault(SELF_TEST)
+            self.safety.take(safety.TESTED)
 
     def show(self, values, first, over_ms):
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""
         self.self_test.skip()
         self.player.cancel()
-        ticks = over_ms * 1000 // self.board.TICK_US
-        self.bubbles.show(values, first, ticks if ticks > 1 else 1)
-        self.mode = ACTIVE
+        self.safety.take(safety.SHOW)
+        if self.safety.mode == ACTIVE:
+            ticks = over_ms * 1000 // self.board.TICK_US
+            self.bubbles.show(values, first, ticks if ticks > 1 else 1)
 
     def stop(self):
-        """Close all valves and keep the air."""
+        """Close all valves and keep the air, unless a fault of the board keeps the vents open."""
         self.self_test.skip()
         self.player.cancel()
-        self.bubbles.hold()
-        self.mode = HOLDING
+        self.safety.take(safety.STOP)
+        if self.safety.mode == HOLDING:
+            self.bubbles.hold()
 
     def vent(self):
         """Open all vent valves until the next `show`."""
         self.player.cancel()
+        self.safety.take(safety.VENT)
         self.bubbles.rest()
-        self.mode = VENTED
 
     def clear(self):
-        """Forget all faults; what still is wrong faults again."""
-        self.faults = 0
-        self.supply.clear()
-        self.bubbles.clear_faults()
-        self.hands.clear()
+        """Acknowledge all faults: forget them; what still is wrong faults again."""
+        self.acknowledge(self.log.newest)
+
+    def acknowledge(self, up_to):
+        """Acknowledge the log up to this entry, and forget what has no later one; what still is wrong faults again."""
+        self.log.acknowledge(up_to)
+        for i in range(self.bubbles.count):
+            if self._fault_ids[i] <= up_to:
+                self.bubbles.forget(i)
+                self.guard.forget(i)
+        if self._fault_id <= up_to:
+            self.faults = 0
+            self.supply.clear()
+            self.hands.clear()
+            self.safety.take(safety.CLEAR)
+            if self.hands.alarms & ESTOP:  # still pressed
+                self._alarm(ESTOP)
+
+    def heard(self):
+        """A valid frame of the host's has come: it lives."""
+        self.safety.heard()
+
+    def use_settings(self):
+        """The settings have changed."""
+        values = self.settings.values
+        self.safety.set_deadman(values[messages.DEADMAN_HOLD], values[messages.DEADMAN_VENT])
+        self.guard.set_budget(values[messages.BUDGET_KPA_S])
 
     def restart(self, into):
         """Vent and start again."""
@@ -186,7 +285,7 @@ def run(app):
     while True:
         periods = app.hands.wait()
         if periods > 0:
-            app.ticks += periods - 1
+            app.ticks = later(app.ticks, periods - 1)
             app.tick()
         elif periods:
             app.listen()

@@ -33,6 +33,7 @@ class Bubbles:
         self._curves = view[curves:]
         self._tables = tables
         self._dead = 64 * board.DEAD_VOLUME_MM3
+        self.rows, self.board = self._rows, self._board  # the guard looks at them
         k = state
         k[control.N] = n
         k[control.TICK_US] = board.TICK_US
@@ -128,6 +129,10 @@ class Bubbles:
         What leads to a fault goes on counting: a host that clears all the time does not disarm the guard.
         """
         control.forget(self._rows, self.count)
+
+    def forget(self, bubble):
+        """The same for one bubble."""
+        self._rows[bubble * control.ROW + control.FAULTS] = 0
 
     def figure(self, bubble, number):
         """One of the figures of a bubble, see `figures`."""

@@ -7,6 +7,7 @@ step begins in the tick of its schedule, however many came before it. Memory is 
 
 from array import array
 
+from bubble_firmware import safety
 from bubble_protocol import steps
 from bubble_protocol.messages import (
     ACTIVE,
@@ -213,7 +214,7 @@ class Player:
         self._depth = 0
         self.sequence.next = 0
         self._next(UNENDED)
-        app.mode = ACTIVE
+        app.safety.take(safety.SHOW)
 
     def _over(self, elapsed):
         """Why the step is over after so many ticks of it, UNENDED where it is not."""

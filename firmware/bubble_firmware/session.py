@@ -7,6 +7,7 @@ buffer that grows and allocates nothing in steady state.
 from array import array
 
 from bubble_firmware import delivery
+from bubble_firmware.care import Care
 from bubble_firmware.requests import NO_ELEMENT, Requests
 from bubble_firmware.telemetry import Telemetry
 from bubble_protocol import codec, framing, messages
@@ -40,7 +41,7 @@ class Session(Requests):
         self._owed = 0  # how many of the last replies have found no room yet
         self._telemetry = Telemetry(app)
         self.heard = 0  # frames of the open session since boot, modulo 65536: the host is alive
-        self.capabilities = messages.DELIVERY | messages.CAN_CHOOSE_TELEMETRY
+        self.capabilities = messages.DELIVERY | messages.SAFETY | messages.CAN_CHOOSE_TELEMETRY
         self._heap_free = heap_free()
         schema = codec.schema_bytes()
         self._schema_crc = crc32_word(schema, 0, len(schema))
@@ -52,6 +53,7 @@ class Session(Requests):
         self._requests[messages.SUBSCRIBE] = self._subscribe
         self._requests[messages.SUBSCRIBE_FIELDS] = self._subscribe_fields
         self._slow = {messages.TABLE_WRITE, messages.TABLE_COMMIT, messages.TABLE_READ, messages.TICKS}
+        self.serve(Care(app, self).handlers())
 
     def serve(self, handlers):
         """Let others handle requests: functions of the count of repetitions, by message id."""
@@ -157,6 +159,7 @@ class Session(Requests):
 
     def _handle(self, message_id, frame, size):
         self._handling = message_id
+        self._app.heard()
         handler = self._requests.get(message_id)
         if handler is None:
             self._refuse(messages.UNKNOWN_MESSAGE, 0, NO_ELEMENT, message_id, 0, 0)

@@ -62,10 +62,10 @@ class StoreRequests:
 
     def _vented(self):
         """Whether all bubbles are vented; refuses where they are not."""
-        mode = self._app.mode
-        if mode == VENTED:
+        safety = self._app.safety
+        if safety.drive == VENTED:
             return True
-        self._session._refuse(messages.NOT_VENTED, 0, _NO_ELEMENT, mode, VENTED, VENTED)
+        self._session._refuse(messages.NOT_VENTED, 0, _NO_ELEMENT, safety.mode, VENTED, VENTED)
         return False
 
     def _pause(self):

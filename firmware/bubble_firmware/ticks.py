@@ -3,7 +3,10 @@
 
 from array import array
 
+from bubble_protocol.messages import TICKS_WRAP
 from bubble_protocol.portable import const, micropython, ptr32
+
+LATEST = TICKS_WRAP - 1
 
 BINS = 24
 _LAST = const(23)
@@ -21,3 +24,9 @@ def count(counts: ptr32, us: int, width: int):
 def bins():
     """Empty bins."""
     return array("i", bytearray(4 * BINS))
+
+
+def later(ticks, periods):
+    """The device time some periods after `ticks`: it goes on from 0 before an integer would become long."""
+    left = LATEST - ticks
+    return ticks + periods if periods <= left else periods - left - 1

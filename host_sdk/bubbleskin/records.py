@@ -160,7 +160,7 @@ class State:
     time: float
     """Device time, s since boot."""
     mode: str
-    """vented, active or holding."""
+    """idle, active, holding, boot, venting, faulted or stopped: see docs/safety.md."""
     height_mm: NDArray[np.float64]
     """The firmware's estimate."""
     pressure_kpa: NDArray[np.float64]

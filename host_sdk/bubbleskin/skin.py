@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from bubble_protocol import messages
+from bubbleskin import safety
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import Clock
@@ -183,6 +184,30 @@ class AsyncSkin:
         """See `Skin.clear_faults`."""
         await self._link.call("CLEAR")
 
+    async def fault_log(self) -> list[safety.Fault]:
+        """See `Skin.fault_log`."""
+        found: list[safety.Fault] = []
+        while True:
+            reply = await self._link.call("FAULTS_READ", (found[-1].id if found else 0,))
+            more = safety.entries(reply, self.info.tick)
+            found += more
+            if not more or found[-1].id == reply["newest"]:
+                return found
+
+    async def acknowledge(self, fault: "safety.Fault | int") -> None:
+        """See `Skin.acknowledge`."""
+        await self._link.call("FAULTS_ACK", (fault.id if isinstance(fault, safety.Fault) else fault,))
+
+    async def settings(self) -> dict[str, safety.Setting]:
+        """See `Skin.settings`."""
+        return safety.settings(await self._link.call("SETTING_READ"))
+
+    async def configure(self, **wanted: float) -> None:
+        """See `Skin.configure`."""
+        rows = safety.changes(wanted, await self.settings())
+        if rows:
+            await self._link.call("SETTING_WRITE", (), rows)
+
     async def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
         """See `Skin.upload_tables`."""
         from bubbleskin.physics.calibration import Calibration
@@ -253,7 +278,7 @@ class AsyncSkin:
         await self._link.wait(self._link.transport.now() + seconds)
 
     async def aclose(self) -> None:
-        """Let go of the device. It keeps its shape; `vent` first to leave it flat."""
+        """Let go of the device. Without a host it holds what moves after 250 ms and vents after 1 s, see `settings`."""
         try:
             await self._telemetry.aclose()
         finally:
@@ -402,8 +427,27 @@ class Skin:
         return drive(self._skin.faults())
 
     def clear_faults(self) -> None:
-        """Forget all faults, the board's too; what still is wrong faults again."""
+        """Acknowledge all faults, the board's too: they are forgotten; what still is wrong faults again."""
         drive(self._skin.clear_faults())
+
+    def fault_log(self) -> list[safety.Fault]:
+        """What has gone wrong since the wristband's start, oldest first: the last 16 entries, with ids and times.
+
+        It also has what is no fault of `faults()`: `host_silent`, when a deadman's stage was reached.
+        """
+        return drive(self._skin.fault_log())
+
+    def acknowledge(self, fault: safety.Fault | int) -> None:
+        """Acknowledge faults up to this entry of `fault_log`, or its id; what has come since stays."""
+        drive(self._skin.acknowledge(fault))
+
+    def settings(self) -> dict[str, safety.Setting]:
+        """What can be set: deadman_hold, deadman_vent (s), budget_kpa_s; values in use and this wristband's limits."""
+        return drive(self._skin.settings())
+
+    def configure(self, **wanted: float) -> None:
+        """Change settings, all or none: `configure(deadman_vent=5.0)`. `InvalidInput` beyond the wristband's limits."""
+        drive(self._skin.configure(**wanted))
 
     def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
         """Use other height to pressure tables, until the device restarts; all or none are taken.
@@ -446,7 +490,7 @@ class Skin:
         drive(self._skin.sleep(seconds))
 
     def close(self) -> None:
-        """Let go of the device. It keeps its shape; `vent` first to leave it flat."""
+        """Let go of the device. Without a host it holds what moves after 250 ms and vents after 1 s, see `settings`."""
         drive(self._skin.aclose())
 
     def __enter__(self) -> Self:

@@ -19,11 +19,13 @@ STORE_SAVE, STORE_INFO, STORE_RESET, FIGURES_WRITE, FIGURES_READ = 0x16, 0x17, 0
 SEQUENCE_BEGIN, SEQUENCE_WRITE, SEQUENCE_ARM, SEQUENCE_START = 0x20, 0x21, 0x22, 0x23
 SEQUENCE_CONTROL, SEQUENCE_STATE, SEQUENCE_EVENT = 0x24, 0x25, 0x26
 SUBSCRIBE_FIELDS, TELEMETRY_FIELDS = 0x1B, 0x1C
+FAULTS_READ, FAULTS_ACK, SETTING_READ, SETTING_WRITE = 0x12, 0x13, 0x14, 0x15
 ERROR = 0x7F
 
 # What ERROR says went wrong.
 UNKNOWN_MESSAGE, WRONG_LENGTH, OUT_OF_RANGE, WRONG_COUNT, BAD_TABLE, BAD_CRC, NO_COMMON_PROTOCOL, FAULTED = range(1, 9)
 BOARD_FAULT, OVERTAKEN = 9, 10
+NO_SETTING = 12
 NOT_VENTED, STORE_FOREIGN, STORE_FAILED = 15, 16, 17
 WRONG_BOARD, BAD_STEP, BAD_LOOP, OUT_OF_ORDER, NO_ROOM, NOT_READY, TOO_LATE = range(18, 25)
 ERRORS = (
@@ -37,6 +39,7 @@ ERRORS = (
     (FAULTED, "faulted", "the device failed at this request and vents"),
     (BOARD_FAULT, "board_fault", "a fault of the board forbids it: asked are its bits; mend the cause, then CLEAR"),
     (OVERTAKEN, "overtaken", "a later STOP, VENT or session came first: not applied, and never will be"),
+    (NO_SETTING, "no_setting", "no setting has this number: asked; low to high exist"),
     (NOT_VENTED, "not_vented", "allowed only while all bubbles are vented: asked is the mode; VENT first"),
     (
         STORE_FOREIGN,
@@ -71,20 +74,28 @@ ERRORS = (
 )
 
 # Bits of `capabilities`.
-DELIVERY, STORE, CAN_SEQUENCES, CAN_CHOOSE_TELEMETRY = 1, 4, 8, 16
+DELIVERY, SAFETY, STORE, CAN_SEQUENCES, CAN_CHOOSE_TELEMETRY = 1, 2, 4, 8, 16
 CAPABILITIES = (
     (DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),
+    (SAFETY, "safety", "a deadman, a fault log, settings"),
     (STORE, "store", "tables, settings and figures can be stored"),
     (CAN_SEQUENCES, "sequences", "sequences are played on the device's own clock"),
     (CAN_CHOOSE_TELEMETRY, "telemetry_fields", "SUBSCRIBE_FIELDS: telemetry of chosen columns"),
 )
 
-# What the board as a whole is doing.
-VENTED, ACTIVE, HOLDING = range(3)
+TICKS_WRAP = 1 << 30  # device time counts up to here and goes on from 0: after 62 days at 5 ms. No integer becomes long
+
+# What the board as a whole is doing: the states of `bubble_firmware.safety`.
+IDLE, ACTIVE, HOLDING, BOOT, MODE_VENTING, MODE_FAULTED, MODE_STOPPED = range(7)
+VENTED = IDLE  # its name before there were others in which the vents are open
 MODES = (
-    (VENTED, "vented", "every bubble's vent valve is open"),
+    (IDLE, "idle", "every vent valve is open, no bubble has pressure, nothing forbids a show"),
     (ACTIVE, "active", "heights are controlled"),
-    (HOLDING, "holding", "all valves are closed and stay closed"),
+    (HOLDING, "holding", "all valves are closed and stay closed: STOP, or the host is silent"),
+    (BOOT, "boot", "vented; the self-test is running or has not begun"),
+    (MODE_VENTING, "venting", "every vent valve is open, the bubbles are on their way to no pressure"),
+    (MODE_FAULTED, "faulted", "vented, SHOW is refused: a fault of the board stands that CLEAR has to acknowledge"),
+    (MODE_STOPPED, "stopped", "vented, SHOW is refused: the emergency stop was pressed, CLEAR has to acknowledge it"),
 )
 
 # What one bubble is doing.
@@ -97,16 +108,29 @@ STATUSES = (
     (FAULT, "fault", "isolated and vented; see its faults"),
 )
 
-# Faults of one bubble, as bits.
-OVERPRESSURE, SENSOR_LOST, VALVE_TIME = 1, 2, 4
+# Faults of one bubble, as bits. The bubble is isolated: fill closed, vent open, until they are acknowledged.
+OVERPRESSURE, SENSOR_LOST, VALVE_TIME, LEAK, NO_AIR, VALVE_STUCK, SENSOR_STUCK, BUDGET = 1, 2, 4, 8, 16, 32, 64, 128
 FAULTS = (
     (OVERPRESSURE, "overpressure", "pressure above the board's limit"),
     (SENSOR_LOST, "sensor_lost", "the sensor reads the end of its range: broken wire or missing chip"),
     (VALVE_TIME, "valve_time", "the fill valve was open longer than the board allows at a time"),
+    (
+        LEAK,
+        "leak",
+        "air escapes: a leak, a bubble off its barb, a vent valve that does not close; or a sensor that has fallen",
+    ),
+    (NO_AIR, "no_air", "air does not arrive: a fill valve that does not open, a kinked or lost tube"),
+    (
+        VALVE_STUCK,
+        "valve_stuck",
+        "pressure that nobody asked for: a fill valve that does not close, a vent that does not open",
+    ),
+    (SENSOR_STUCK, "sensor_stuck", "the sensor says what cannot be: always the same count, or a leap"),
+    (BUDGET, "budget", "under pressure for too long: its budget of pressure and time is used up, see settings"),
 )
 
 # Faults of the board as a whole, as bits. They stay until CLEAR.
-ESTOP, SUPPLY_LOST, VALVE_CHIP, SENSOR_CHIP, EXCEPTION, WATCHDOG, SELF_TEST = 1, 2, 4, 8, 16, 32, 64
+ESTOP, SUPPLY_LOST, VALVE_CHIP, SENSOR_CHIP, EXCEPTION, WATCHDOG, SELF_TEST, OVERFILLED = 1, 2, 4, 8, 16, 32, 64, 128
 BOARD_FAULTS = (
     (ESTOP, "emergency_stop", "the emergency stop is pressed, or its loop is broken: everything vents"),
     (
@@ -119,8 +143,56 @@ BOARD_FAULTS = (
     (EXCEPTION, "exception", "an exception in the firmware: everything vented"),
     (WATCHDOG, "watchdog", "the firmware hung and was restarted by the watchdog: everything vented"),
     (SELF_TEST, "self_test", "the self-test at boot found a sensor or a valve that does not work, see INFO"),
+    (
+        OVERFILLED,
+        "overfilled",
+        "a bubble fills though its fill valve is closed and its vent open: everything vents, the reservoir is emptied",
+    ),
 )
-VENTING = ESTOP | VALVE_CHIP  # while one of these stands, SHOW is refused
+VENTING = ESTOP | VALVE_CHIP | OVERFILLED  # while one of these stands, SHOW is refused
+
+# What else is written to the fault log: it forbids nothing. Bits beyond those of the board's faults.
+HOST_SILENT = 256
+EVENTS = (
+    (
+        HOST_SILENT,
+        "host_silent",
+        "the host was silent in ACTIVE or HOLDING: held, then vented. The value is how long, ms",
+    ),
+)
+BOARD = 255  # in place of a bubble's number
+
+# What can be set: (number, name, unit, least, most, default, meaning). None: the board's.
+DEADMAN_HOLD, DEADMAN_VENT, BUDGET_KPA_S = range(3)
+SETTINGS = (
+    (
+        DEADMAN_HOLD,
+        "deadman_hold_ms",
+        "ms",
+        50,
+        5000,
+        250,
+        "silence of the host after which bubbles that move are held",
+    ),
+    (
+        DEADMAN_VENT,
+        "deadman_vent_ms",
+        "ms",
+        100,
+        60000,
+        1000,
+        "silence after which all are vented; not below the other",
+    ),
+    (
+        BUDGET_KPA_S,
+        "budget_kpa_s",
+        "kPa s",
+        10,
+        None,
+        None,
+        "pressure above the board's threshold times time, for each bubble",
+    ),
+)
 
 # What has become of the self-test at boot.
 NOT_RUN, RUNNING, PASSED, FAILED, SKIPPED = range(5)
@@ -594,6 +666,62 @@ MESSAGES = (
         (("value", I16, "", None, None, "per bubble one value for each bit of fields, lowest bit first"),),
         "unasked: the columns chosen; the sequence number counts what was due, so a gap is a loss",
     ),
+    (
+        FAULTS_READ,
+        "FAULTS_READ",
+        (("after", I32, "", 0, 0x3FFFFFFF, "entries with a greater id; 0: from the oldest"),),
+        (),
+        "what has gone wrong, and when?",
+    ),
+    (
+        FAULTS_READ | REPLY,
+        "FAULTS_READ_REPLY",
+        (
+            _TICKS,
+            ("newest", U32, "", None, None, "id of the newest entry; 0: there was none since boot"),
+            ("acknowledged", U32, "", None, None, "entries up to this id are acknowledged"),
+        ),
+        (
+            ("id", U32, "", None, None, "counts from 1"),
+            ("at", U32, "ticks", None, None, "when, device time"),
+            ("what", U16, "", None, None, "a bit: see faults of a bubble, faults of the board, events"),
+            ("bubble", U8, "", None, None, "255: the board"),
+            ("value", I32, "", None, None, "Pa: the bubble's pressure, the board's reservoir; of an event see there"),
+        ),
+        "entries of the fault log, oldest first; ask again after the last id until there are none",
+    ),
+    (
+        FAULTS_ACK,
+        "FAULTS_ACK",
+        (("up_to", I32, "", 0, 0x3FFFFFFF, "id of the newest entry that has been seen"),),
+        (),
+        "acknowledge: forget the faults up to this entry; those that still are there fault again",
+    ),
+    (FAULTS_ACK | REPLY, "FAULTS_ACK_REPLY", (_TICKS,), (), "acknowledged"),
+    (SETTING_READ, "SETTING_READ", (), (), "what is set?"),
+    (
+        SETTING_READ | REPLY,
+        "SETTING_READ_REPLY",
+        (_TICKS, ("version", U32, "", None, None, "counts changes since boot")),
+        (
+            ("setting", U8, "", None, None, "see settings"),
+            ("value", I32, "", None, None, "in use"),
+            ("low", I32, "", None, None, "the least that this board allows"),
+            ("high", I32, "", None, None, "the most that this board allows"),
+        ),
+        "all settings",
+    ),
+    (
+        SETTING_WRITE,
+        "SETTING_WRITE",
+        (),
+        (
+            ("setting", U8, "", None, None, "see settings"),
+            ("value", I32, "", 0, 0x3FFFFFFF, "wanted"),
+        ),
+        "set: all of these, or none",
+    ),
+    (SETTING_WRITE | REPLY, "SETTING_WRITE_REPLY", (_TICKS,), (), "set, from the next tick"),
     (
         ERROR,
         "ERROR",

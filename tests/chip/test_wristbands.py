@@ -136,4 +136,4 @@ def test_a_program_that_hangs_is_ended_by_the_watchdog_and_says_so_afterwards(em
     skin.sleep(0.3)
     health = skin.health()
     assert "watchdog" in health.board_faults
-    assert health.mode == "vented"
+    assert health.mode == "idle"

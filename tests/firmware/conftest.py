@@ -48,6 +48,7 @@ class Hands:
         self.pulses = None
         self.pump = self.dump = None
         self.in_vent = False
+        self.noise = 0
         self.full = False  # no room for what is sent
         self.broken = set()  # names of hands that raise
 
@@ -56,8 +57,11 @@ class Hands:
             raise OSError(f"{name} is broken")
 
     def sense(self, counts):
+        """A sensor has noise: now and then a count more, where that is none of the ends."""
         self._use("sense")
-        counts[:] = type(counts)("H", self.counts)
+        self.noise = (self.noise + 1) % 8
+        more = self.noise == 0
+        counts[:] = type(counts)("H", [count + (more and 8 < count < 4000) for count in self.counts])
 
     def act(self, pulses, pump, dump):
         self._use("act")
@@ -109,7 +113,9 @@ class Rig:
         return wire.encode(name, sequence, fixed, repeated, self.key)
 
     def tick(self, ticks=1):
+        """Let periods pass, with a host that lives."""
         for _ in range(ticks):
+            self.app.heard()
             self.app.tick()
 
     def heard(self):
@@ -171,6 +177,12 @@ class Rig:
 @pytest.fixture(params=["wristband7", "wristband19"])
 def rig(request):
     return Rig(request.param)
+
+
+@pytest.fixture(scope="session")
+def new_rig():
+    """Makes rigs, for tests that need one for each example."""
+    return Rig
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_firmware import boards, control, curve, nominal, table
+from bubble_firmware import boards, control, curve, guard, nominal, table
 from bubble_firmware.bubbles import Bubbles
 from bubble_protocol import codec, messages
 from bubbleskin import Table, YeohBalloon, build_table
@@ -25,7 +25,24 @@ REPEATED = [name for name in SCHEMA if hasattr(control, name)]
 def test_what_control_repeats_of_the_schema_is_the_schemas():
     """It repeats them because MicroPython's compiler folds constants of the same module only."""
     assert {name: getattr(control, name) for name in REPEATED} == {name: getattr(messages, name) for name in REPEATED}
-    assert set(SCHEMA) - set(REPEATED) <= {"HOLDING"}
+    known = {name: getattr(messages, name) for name in (*SCHEMA, "VENTED") if hasattr(guard, name)}
+    assert {name: getattr(guard, name) for name in known} == known
+    assert set(SCHEMA) <= {*REPEATED, *known, "IDLE", "HOLDING", "BOOT", "VENTING", "FAULTED"}
+
+
+def test_what_the_guard_repeats_of_control_is_controls():
+    lines = Path(guard.__file__).read_text(encoding="utf-8").split("# From the schema")[0].splitlines()
+    names = [line.split(" = const(")[0] for line in lines if " = const(" in line]
+    assert len(names) > 15
+    assert {name: getattr(guard, name) for name in names} == {name: getattr(control, name) for name in names}
+
+
+def test_the_guards_rows_do_not_overlap():
+    lines = Path(guard.__file__).read_text(encoding="utf-8").splitlines()
+    names = [line.split(" = const(")[0] for line in lines if " = const(" in line]
+    for first, end in (("WAS_AIR", "GUARD"), ("ALLOWED", "NUMBERS")):
+        row = names[names.index(first) : names.index(end) + 1]
+        assert [getattr(guard, name) for name in row] == list(range(len(row)))
 
 
 def test_rows_do_not_overlap():

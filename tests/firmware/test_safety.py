@@ -26,7 +26,7 @@ def vented(rig, bubble):
 def assert_isolated(rig, bubble, fault):
     """This bubble is vented for its fault, all others are controlled as before."""
     state = rig.state()
-    assert state["faults"][bubble] == fault
+    assert state["faults"][bubble] & fault
     assert state["status"][bubble] == messages.FAULT
     assert vented(rig, bubble)
     others = [other for other in range(rig.board.BUBBLES) if other != bubble]
@@ -62,13 +62,14 @@ def test_a_wrong_reading_isolates_its_bubble_within_two_ticks(rig, wrong, fault)
     assert_isolated(rig, bubble, fault)
 
     # It latches: a sensor that is well again changes nothing, nor does another shape.
-    rig.sense(bubble, HELD_PA)
+    rig.sense(bubble, 0)  # for it is vented
     rig.tick(20)
     rig.show(HELD_UM)
     rig.tick(20)
     assert_isolated(rig, bubble, fault)
 
     # Cleared, it is controlled again.
+    rig.sense(bubble, HELD_PA)
     rig.ask("CLEAR")
     rig.tick(40)
     assert not vented(rig, bubble)
@@ -110,19 +111,20 @@ def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
         assert rig.write_table(bubble, [(5000, 0), (14000, 40000)] if bubble == 0 else [(5000, 0), (14000, 34000)])
     rig.app.tables.swap()
     rig.app.bubbles.use_tables()
-    rig.hands.counts[-1] = board.SUPPLY_ZERO + 25000 // board.SUPPLY_PA_PER_COUNT
+    rig.hands.counts[-1] = board.SUPPLY_ZERO + 29000 // board.SUPPLY_PA_PER_COUNT
     rig.sense(0, 26000)
     for bubble in range(1, board.BUBBLES):
         rig.sense(bubble, 18900)  # where their table has 10 mm
-    rig.tick(40)
+    rig.tick(20)
     rig.show(14000, *[10000] * (board.BUBBLES - 1))
-
     rig.tick()
 
     open_ticks = int(rig.pulse(0)[0] == board.TICK_US)
     while not vented(rig, 0):
         rig.tick()
         open_ticks += rig.pulse(0)[0] == board.TICK_US
+        if open_ticks > 1:
+            rig.sense(0, 28300)  # what flows shows in the tube
         assert open_ticks * board.TICK_US <= board.FILL_MAX_US, "the valve is open for longer than allowed"
     assert open_ticks * board.TICK_US == board.FILL_MAX_US
     assert_isolated(rig, 0, messages.VALVE_TIME)
@@ -169,6 +171,9 @@ def test_clearing_all_the_time_does_not_disarm_the_guard(rig7, wrong, fault):
 def test_stop_closes_and_vent_opens_all_valves(rig):
     hold(rig)
     rig.show(14000)
+    rig.tick(2)
+    for bubble in range(rig.board.BUBBLES):
+        rig.sense(bubble, HELD_PA + 3000)  # what flows shows in the tube
     rig.tick(10)
     rig.ask("STOP")
     rig.tick()  # decided in the tick after the request
@@ -178,14 +183,14 @@ def test_stop_closes_and_vent_opens_all_valves(rig):
     rig.tick()
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
     assert set(rig.state()["status"]) == {messages.RESTING}
-    assert rig.app.mode == messages.VENTED
+    assert rig.app.mode == messages.MODE_VENTING
 
 
 def test_the_board_starts_vented(rig):
     assert rig.hands.in_vent
     rig.tick(3)
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
-    assert rig.app.mode == messages.VENTED
+    assert rig.app.mode == messages.IDLE
 
 
 # Exceptions.
@@ -197,7 +202,7 @@ def test_an_exception_in_the_tick_vents(rig, hand):
     rig.hands.broken.add(hand)
     rig.tick()
     assert rig.hands.in_vent
-    assert rig.app.mode == messages.VENTED
+    assert rig.app.mode == messages.MODE_VENTING
     assert rig.app.exceptions == 1
 
     rig.hands.broken.clear()
@@ -214,7 +219,7 @@ def test_a_board_that_fails_in_every_tick_still_answers(rig7, hand):
     rig7.show(12000)
     rig7.tick()
     assert rig7.hands.in_vent
-    assert rig7.app.mode == messages.VENTED
+    assert rig7.app.mode == messages.MODE_VENTING
 
 
 def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
@@ -226,7 +231,7 @@ def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
     monkeypatch.setattr(rig7.app, "show", fail)
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == messages.FAULTED
     assert rig7.hands.in_vent
-    assert rig7.app.mode == messages.VENTED
+    assert rig7.app.mode == messages.MODE_VENTING
     assert rig7.ask("PING", (1,)).id == messages.PING | messages.REPLY
 
     # A failure later, with no request at hand, has nobody to be told to.
@@ -258,7 +263,7 @@ def test_a_broken_link_does_not_stop_the_tick(rig7, hand):
     rig7.hands.to_device = b""
     answer = rig7.ask("INFO")
     assert answer["exceptions"] >= 1
-    assert answer["mode"] == messages.VENTED
+    assert answer["mode"] == messages.MODE_VENTING
     assert answer["ticks"] == rig7.app.ticks
 
 

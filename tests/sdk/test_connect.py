@@ -318,7 +318,7 @@ def test_a_served_board_takes_shapes_in_real_time(served):
         skin.vent()
     assert served.board.height_mm.max() < 13
     with bs.connect(served.name) as again:
-        assert again.state().mode == "vented"
+        assert again.state().mode in ("venting", "idle")
 
 
 class PortWithoutLines(serial.Serial):

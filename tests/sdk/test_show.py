@@ -25,24 +25,24 @@ def test_not_waiting_returns_at_once(skin):
 def test_a_bubble_that_does_not_fill_is_named(skin):
     skin.simulated.inject("fill_stuck", 3, -1)
     before = skin.simulated.time
-    with pytest.raises(bs.DeviceFault, match=r"^Bubble 3 did not settle within 3 s: at \d+\.\d\d instead of 10.00 mm"):
+    with pytest.raises(bs.DeviceFault, match=r"reports faults \(bubble 3: no_air\)"):
         skin.show(np.full(7, 10.0))
-    assert skin.simulated.time - before == pytest.approx(3.0, abs=0.1)
+    assert skin.simulated.time - before < 0.5
 
 
-def test_the_time_of_a_ramp_is_waited_in_addition(skin):
+def test_bubbles_that_do_not_fill_on_a_ramp_are_named(skin):
     skin.simulated.inject("fill_stuck", 0, -1)
     skin.simulated.inject("fill_stuck", 6, -1)
     before = skin.simulated.time
-    with pytest.raises(bs.DeviceFault, match=r"^Bubbles 0 and 6 did not settle within 5 s"):
+    with pytest.raises(bs.DeviceFault, match=r"reports faults .*bubble 0: no_air"):
         skin.show(np.full(7, 10.0), over=2.0)
-    assert skin.simulated.time - before == pytest.approx(5.0, abs=0.1)
+    assert skin.simulated.time - before < 2.0
 
 
 def test_a_bubble_that_does_not_empty_is_named(skin):
     skin.show(np.full(7, 10.0))
     skin.simulated.inject("vent_stuck", 5, -1)
-    with pytest.raises(bs.DeviceFault, match=r"^Bubble 5 did not settle .* instead of 0.00 mm"):
+    with pytest.raises(bs.DeviceFault, match=r"reports faults \(bubble 5: valve_stuck\)"):
         skin.show(np.zeros(7))
 
 
@@ -59,7 +59,7 @@ def test_a_fault_is_told_and_kept_until_it_is_cleared(skin):
     assert skin.show(np.full(7, 10.0)).height_mm == pytest.approx(10, abs=0.2)
 
 
-@pytest.mark.parametrize(("interrupt", "mode"), [("stop", "holding"), ("vent", "vented")])
+@pytest.mark.parametrize(("interrupt", "mode"), [("stop", "holding"), ("vent", "venting")])
 def test_a_show_that_is_interrupted_says_so(interrupt, mode):
     async def script():
         async with await bs.aconnect("sim://wristband7?contact=0") as skin, asyncio.timeout(10):

@@ -113,7 +113,7 @@ def test_a_bubble_that_still_empties_or_has_not_begun_to_rise_is_not_settled():
 
 
 def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
-    (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 99), [(5000, 0, 0, 99, 128)]))
+    (reply,) = receive(wire.encode("STATE_REPLY", 1, (400, 99), [(5000, 0, 0, 99, 0)]))
     state = State.of(reply, 0.005)
     assert (state.mode, state.status, state.faults) == ("unknown", ("unknown",), ((),))
     assert not state.settled
@@ -171,6 +171,10 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
             "Mend the cause, then `clear_faults()`.",
         ),
         (
+            error(messages.NO_SETTING, asked=9, low=0, high=2),
+            "The wristband refused SHOW: it has no setting 9; they are numbered 0 to 2. Update its firmware.",
+        ),
+        (
             error(messages.OVERTAKEN),
             "The wristband refused SHOW: a later STOP or VENT has overtaken it. It was not applied.",
         ),
@@ -223,6 +227,7 @@ def test_every_error_of_the_schema_is_explained():
     explained |= {messages.BOARD_FAULT, messages.OVERTAKEN, messages.WRONG_BOARD, messages.BAD_STEP, messages.BAD_LOOP}
     explained |= {messages.OUT_OF_ORDER, messages.NO_ROOM, messages.NOT_READY, messages.TOO_LATE}
     explained |= {messages.NOT_VENTED, messages.STORE_FOREIGN, messages.STORE_FAILED}
+    explained |= {messages.NO_SETTING}
     assert explained == {code for code, _, _ in messages.ERRORS}
 
 

@@ -12,6 +12,8 @@ FILL_MAX_US = 1000000  # longest a fill valve may stay open at a time; 5 to 14 m
 SUPPLY_PA = 60000
 SUPPLY_MAX_PA = 75000
 SUPPLY_LOW_PA = 45000  # less for long and the supply is lost: a bubble at its limit could not be filled
+BUDGET_KPA_S = 3600  # pressure above the next line times time, for each bubble: a limit of comfort, not a medical one
+BUDGET_FREE_PA = 20000  # 7 mm; what is below it recovers. 30 kPa may stay for 6 minutes
 
 SEQUENCE_BYTES = 49152  # memory for the steps of a sequence
 
@@ -22,6 +24,9 @@ SUPPLY_ZERO = 160
 SUPPLY_PA_PER_COUNT = 25
 COUNT_LOW = 8  # at or beyond these a sensor is not believed
 COUNT_HIGH = 4087
+FROZEN_US = (
+    300000  # one that says the same for so long is not read: noise is 3 counts. Half a count would be too little
+)
 
 # Valves and lines.
 VALVE_OPENS_US = 1200

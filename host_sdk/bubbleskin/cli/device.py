@@ -91,11 +91,16 @@ def info(device: str | None, json: bool) -> None:
     """Say who the wristband is and how it does."""
     with connect(device) as skin:
         facts = dataclasses.asdict(skin.info) | dataclasses.asdict(skin.health()) | {"faults": skin.faults()}
+        facts["fault_log"] = [dataclasses.asdict(fault) for fault in skin.fault_log()]
     if json:
         click.echo(jsonlib.dumps(facts, indent=2))
         return
     table = Table(show_header=False, box=None)
     units = {"tick": " s", "time": " s", "tick_worst": " s", "heap_free": " bytes", "supply_kpa": ""}
+    for fault in facts.pop("fault_log"):
+        where = "board" if fault["bubble"] is None else f"bubble {fault['bubble']}"
+        seen = "" if fault["acknowledged"] else ", not acknowledged"
+        facts[f"fault {fault['id']}"] = f"{fault['name']}, {where}, at {fault['time']:.3f} s, {fault['value']:g}{seen}"
     for name, value in facts.items():
         if name in ("tables_crc", "boot_id"):
             value = f"{value:08x}"

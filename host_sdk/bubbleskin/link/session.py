@@ -15,6 +15,7 @@ from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.errors import DeviceRefused, DeviceSilent, LinkError, Overtaken, WrongDevice
 from bubbleskin.link import keepalive, sentences, wire
 from bubbleskin.link.inbox import UNASKED, Inbox
+from bubbleskin.link.ticks import DeviceTicks
 from bubbleskin.link.transport import Transport
 from bubbleskin.link.window import Request, Window
 
@@ -68,6 +69,7 @@ class Link:
         self._sent_at = 0.0
         self._asked_at = 0.0  # whether the device still is the same
         self._gone: LinkError | None = None  # why the port has gone
+        self._ticks = DeviceTicks()
         self._reading = asyncio.Lock()
         self._opening = asyncio.Lock()
         self._thread: asyncio.Future[None] | None = None
@@ -317,6 +319,7 @@ class Link:
         self._heard = self._heard or bool(data)
         now = self.transport.now()
         for message in self._reader.feed(data):
+            self._ticks.unwrap(message)
             what = message["request"] if message.id == messages.ERROR else message.id & ~messages.REPLY
             if message.id in UNASKED:
                 self.telemetry.append(message)

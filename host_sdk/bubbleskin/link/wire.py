@@ -200,6 +200,8 @@ def explain(error: Received) -> str:
         return f"The wristband refused {name}: its flash does not hold what was written, or it has none for a store."
     if code in _OF_SEQUENCES:
         return f"The wristband refused {name}: {_OF_SEQUENCES[code](error)}"
+    if code == messages.NO_SETTING:
+        return f"The wristband refused {name}: it has no setting {asked}; they are numbered {low} to {high}. Update its firmware."
     if code == messages.UNKNOWN_MESSAGE:
         return f"The wristband does not know {name}: its firmware is older than this SDK. Update the firmware."
     return f"The wristband refused {name} with error {code}."

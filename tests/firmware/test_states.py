@@ -1,0 +1,289 @@
+"""The board's states, the deadman and the settings: whatever happens in whatever order, and to the tick."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bubble_firmware import safety
+from bubble_firmware.faultlog import FaultLog
+from bubble_firmware.guard import BUDGET
+from bubble_firmware.ticks import later
+from bubble_protocol import messages
+from bubble_protocol.messages import (
+    ACTIVE,
+    BOOT,
+    ESTOP,
+    HOLDING,
+    HOST_SILENT,
+    IDLE,
+    MODE_FAULTED,
+    MODE_STOPPED,
+    MODE_VENTING,
+    OVERFILLED,
+    VALVE_CHIP,
+    VENTING,
+)
+
+HELD_PA, HELD_UM = 22609, 10008  # a knot of the nominal table
+
+
+def hold(rig):
+    for bubble in range(rig.board.BUBBLES):
+        rig.sense(bubble, HELD_PA)
+    rig.show(HELD_UM)
+    rig.tick(40)
+
+
+def silence(rig, ticks):
+    """Let periods pass without a word of the host's."""
+    for _ in range(ticks):
+        rig.app.tick()
+
+
+def vented(rig):
+    return all(rig.pulse(bubble) == (0, rig.board.TICK_US) for bubble in range(rig.board.BUBBLES))
+
+
+# The table.
+
+EVENTS = [number for number, _ in safety.EVENTS]
+
+
+@given(st.lists(st.sampled_from(EVENTS), max_size=40))
+def test_whatever_happens_the_emergency_stop_wins_and_a_fault_is_cleared_before_a_show(events):
+    class Board:
+        TICK_US = 5000
+
+    state = safety.Safety(Board)
+    standing = None  # what has to be acknowledged
+    for event in events:
+        state.take(event)
+        if event == safety.ESTOP:
+            standing = MODE_STOPPED
+        elif event == safety.FAULT and standing is None:
+            standing = MODE_FAULTED
+        elif event == safety.CLEAR:
+            standing = None
+        assert (state.mode == standing) if standing is not None else state.mode not in (MODE_STOPPED, MODE_FAULTED)
+        assert state.drive == {ACTIVE: 1, HOLDING: 2}.get(state.mode, 0)
+        if event in (safety.VENT, safety.SILENT, safety.FAILED):
+            assert state.drive == 0
+    assert state.mode in {number for number, _, _ in messages.MODES}
+
+
+REQUESTS = ("SHOW", "STOP", "VENT", "CLEAR", "FAULTS_ACK", "PING", "silence", "long silence", "tick")
+THINGS = st.one_of(
+    st.sampled_from(REQUESTS), st.sampled_from([("alarm", bits) for bits in (0, ESTOP, VALVE_CHIP, ESTOP | VALVE_CHIP)])
+)
+
+
+@settings(max_examples=25)
+@given(things=st.lists(THINGS, max_size=20))
+def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, things):
+    rig = new_rig("wristband7")
+    for thing in things:
+        if isinstance(thing, tuple):
+            rig.hands.alarms = thing[1]
+            rig.app.heard()
+            rig.app.tick()
+        elif "silence" in thing:
+            silence(rig, 210 if "long" in thing else 55)
+            if "long" in thing:
+                assert rig.app.safety.drive == 0
+        elif thing == "tick":
+            rig.tick(3)
+        elif thing == "SHOW":
+            rig.ask("SHOW", (0,), [(9000,)] * 7)
+        else:
+            rig.ask(thing, (rig.app.log.newest,) if thing == "FAULTS_ACK" else (0,) if thing == "PING" else ())
+        mode, faults = rig.app.mode, rig.app.faults
+        if rig.hands.alarms & VENTING:
+            rig.tick()
+            assert rig.app.mode == (MODE_STOPPED if rig.app.faults & ESTOP else MODE_FAULTED)
+            assert vented(rig), "whatever was asked"
+        elif faults & ESTOP:
+            assert mode == MODE_STOPPED
+        elif faults & VENTING:
+            assert mode == MODE_FAULTED
+        else:
+            assert mode not in (MODE_STOPPED, MODE_FAULTED)
+    assert rig.app.exceptions == 0
+
+
+def test_boot_idle_active_venting_idle(rig):
+    assert rig.app.mode == BOOT
+    rig.tick()
+    assert rig.app.mode == IDLE
+    hold(rig)
+    assert rig.app.mode == ACTIVE
+    rig.ask("VENT")
+    rig.tick(3)
+    assert rig.app.mode == MODE_VENTING
+    for bubble in range(rig.board.BUBBLES):
+        rig.sense(bubble, 0)
+    rig.tick()
+    assert rig.app.mode == IDLE
+
+
+# The deadman.
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_silent_host_holds_what_moves_and_then_vents_to_the_tick(rig, moving):
+    board = rig.board
+    hold(rig)
+    if moving:
+        rig.show(12000, over_ms=5000)  # answered in this tick: silence begins
+    else:
+        rig.ask("PING", (0,))
+    hold_ticks, vent_ticks = 250000 // board.TICK_US, 1000000 // board.TICK_US
+    for tick in range(1, vent_ticks + 1):
+        rig.app.tick()
+        expected = MODE_VENTING if tick == vent_ticks else HOLDING if moving and tick >= hold_ticks else ACTIVE
+        assert rig.app.mode == expected, tick
+        if expected == HOLDING and tick > hold_ticks:
+            assert not any(rig.hands.pulses)
+    assert vented(rig), "decided in the same tick"
+    log = rig.ask("FAULTS_READ", (0,))
+    assert log.columns["what"].tolist() == [HOST_SILENT] * (2 if moving else 1)
+    assert log.columns["value"].tolist() == [250, 1000][0 if moving else 1 :]
+    assert set(log.columns["bubble"]) == {messages.BOARD}
+    assert not rig.app.faults, "it forbids nothing"
+    rig.show(HELD_UM)
+    assert rig.app.mode == ACTIVE
+
+
+def test_a_host_that_speaks_is_not_silent(rig7):
+    hold(rig7)
+    rig7.show(12000, over_ms=5000)
+    for _ in range(30):
+        silence(rig7, 48)
+        rig7.ask("PING", (0,))
+        assert rig7.app.mode == ACTIVE
+    garbage = b"\x07garbage\x00"
+    for _ in range(25):
+        rig7.hands.to_device += garbage
+        silence(rig7, 10)
+    assert rig7.app.mode == MODE_VENTING
+
+
+def test_held_by_stop_it_vents_when_the_host_is_silent(rig7):
+    hold(rig7)
+    rig7.ask("STOP")
+    silence(rig7, 199)
+    assert rig7.app.mode == HOLDING
+    silence(rig7, 1)
+    assert rig7.app.mode == MODE_VENTING
+
+
+# Settings.
+
+
+def test_settings_are_kept_within_the_boards_limits(rig7):
+    read = rig7.ask("SETTING_READ").columns
+    for number, low, high in zip(read["setting"].tolist(), read["low"].tolist(), read["high"].tolist(), strict=True):
+        for value in (low - 1, high + 1):
+            answer = rig7.refused("SETTING_WRITE", (), [(messages.DEADMAN_HOLD, 60), (number, value)])
+            assert answer == (messages.OUT_OF_RANGE, 1, 1, value, low, high)
+    assert rig7.refused("SETTING_WRITE", (), [(0, 100), (3, 1)]) == (messages.NO_SETTING, 0, 1, 3, 0, 2)
+    assert rig7.refused("SETTING_WRITE", (), [(0, 3000)]) == (messages.OUT_OF_RANGE, 1, 255, 1000, 3000, 60000)
+    assert (rig7.ask("SETTING_READ").columns["value"] == read["value"]).all(), "all or none"
+    rig7.ask("SETTING_WRITE", (), [(1, 5000), (0, 3000)])
+    assert rig7.ask("SETTING_READ").columns["value"].tolist() == [3000, 5000, 3600]
+    assert rig7.app.settings.version == 1
+    hold(rig7)
+    rig7.ask("PING", (0,))
+    silence(rig7, 999)
+    assert rig7.app.mode == ACTIVE
+    silence(rig7, 1)
+    assert rig7.app.mode == MODE_VENTING
+
+
+def test_the_budget_vents_a_bubble_and_lets_it_recover(rig7):
+    rig7.ask("SETTING_WRITE", (), [(messages.BUDGET_KPA_S, 10)])
+    hold(rig7)
+    ticks = 0
+    while not rig7.app.bubbles.faults(0):
+        rig7.tick()
+        ticks += 1
+    assert rig7.app.bubbles.faults(0) == BUDGET
+    assert 40 + ticks == pytest.approx(10_000 / (HELD_PA - 20_000) * 200, rel=0.02)
+    for bubble in range(7):
+        rig7.sense(bubble, 0)
+    rig7.ask("CLEAR")
+    rig7.tick()
+    assert rig7.app.bubbles.faults(0) == BUDGET, "not yet"
+    rig7.tick(60)  # 20 kPa below the threshold, 10 kPa s: half of it after 0.25 s
+    rig7.ask("CLEAR")
+    rig7.tick(5)
+    assert rig7.app.bubbles.faults(0) == 0
+
+
+# The log.
+
+
+def test_what_comes_after_the_entry_acknowledged_stays(rig7):
+    hold(rig7)
+    rig7.hands.counts[0] = 0
+    rig7.tick(5)
+    seen = rig7.ask("FAULTS_READ", (0,))["newest"]
+    rig7.hands.counts[1] = 0
+    rig7.tick(5)
+    rig7.sense(0, 0)
+    rig7.ask("FAULTS_ACK", (seen,))
+    rig7.tick()
+    assert rig7.app.bubbles.faults(0) == 0
+    assert rig7.app.bubbles.faults(1)
+    log = rig7.ask("FAULTS_READ", (seen,))
+    assert log["acknowledged"] == seen
+    assert log.columns["bubble"].tolist()[0] == 1
+
+
+def test_the_log_keeps_the_last_sixteen(rig7):
+    for tick in range(40):
+        rig7.app.log.add(tick, 1, 0, tick)
+    first = rig7.ask("FAULTS_READ", (0,))
+    rest = rig7.ask("FAULTS_READ", (int(first.columns["id"][-1]),))
+    assert [*first.columns["id"], *rest.columns["id"]] == list(range(25, 41))
+    assert len(rig7.ask("FAULTS_READ", (40,)).columns["id"]) == 0
+
+
+def test_ids_end_before_integers_become_long():
+    log = FaultLog()
+    log.newest = 0x3FFFFFFE
+    assert [log.add(0, 1, 0, 0) for _ in range(3)] == [0x3FFFFFFF] * 3
+
+
+def test_device_time_wraps_before_integers_become_long(rig7):
+    last = messages.TICKS_WRAP - 1
+    assert (later(last, 0), later(last, 1), later(last - 3, 10)) == (last, 0, 6)
+    rig7.app.ticks = last - 1
+    rig7.tick(3)
+    assert rig7.app.ticks == 1
+
+
+def test_an_overfilled_bubble_vents_all_and_empties_the_reservoir(rig7):
+    hold(rig7)
+    rig7.ask("VENT")
+    for bubble in range(7):
+        rig7.sense(bubble, 0)
+    rig7.tick(5)
+    rig7.sense(2, 25000)  # it fills by itself
+    rig7.tick(1 + 300000 // rig7.board.TICK_US)
+    assert rig7.app.mode == MODE_FAULTED
+    assert rig7.app.faults == OVERFILLED
+    rig7.tick()
+    assert (rig7.hands.pump, rig7.hands.dump) == (0, 1)
+    assert vented(rig7)
+    assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == messages.BOARD_FAULT
+
+
+def test_no_fill_valve_opens_to_a_supply_below_the_bubble(rig7):
+    hold(rig7)
+    rig7.hands.counts[-1] = rig7.board.SUPPLY_ZERO + 20000 // rig7.board.SUPPLY_PA_PER_COUNT
+    rig7.tick(40)
+    rig7.show(13000)
+    for _ in range(300):
+        rig7.tick()
+        assert not any(rig7.hands.pulses[::2])
+    assert not any(rig7.app.bubbles.faults(bubble) for bubble in range(7)), "nor is that the bubbles' fault"
