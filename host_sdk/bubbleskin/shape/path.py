@@ -19,8 +19,8 @@ Records = NDArray[Any]
 
 MOVE = 0.25e-3
 """m. An increment that moves a bubble further is halved."""
-FINEST = 1 / 1024
-"""Of an increment: what is not smooth at this size is a snap."""
+HALVINGS = 10
+"""Of an increment, at most: what is not smooth then is a snap."""
 TRUST = 0.3e-3
 """m. Longest single Newton step of a bubble: short enough to stay in the valley that it is in."""
 TOLERANCE = 1e-7
@@ -65,11 +65,22 @@ def _moved(a: Array, b: Array) -> float:
 class Walker:
     """A state that is led along pressures; what stays the same on the way: bubbles, springs, pairs, kicks."""
 
-    def __init__(self, bubbles: Records, springs: tuple[float, ...], state: Array, kick: float, seed: int) -> None:
+    def __init__(
+        self,
+        bubbles: Records,
+        springs: tuple[float, ...],
+        state: Array,
+        *,
+        kick: float = 0.0,
+        seed: int = 0,
+        move: float = MOVE,
+        halvings: int = HALVINGS,
+    ) -> None:
         self.bubbles, self.state = bubbles, state.copy()
         self.springs = np.array([springs], SPRINGS)[0]
         self._barbs = np.column_stack([bubbles["x"], bubbles["y"]])
         self._tree = cKDTree(self._barbs)
+        self._move, self._finest = move, 0.5**halvings
         self._kick, self._rng = kick, np.random.default_rng(seed)
         self._trace = np.empty(LIMIT + 1)
         self._leeway = _LEEWAY
@@ -98,21 +109,21 @@ class Walker:
             self._relax(pressure)
             self.increments += 1
             distance = _moved(last, self.state)
-            finest = size <= 1.001 * FINEST / increments
-            if (distance > MOVE or self.ended != CONVERGED) and not finest:
+            finest = size <= 1.001 * self._finest / increments
+            if (distance > self._move or self.ended != CONVERGED) and not finest:
                 self.state, size = last, size / 2
                 continue
-            if distance > MOVE and self.ended != BURST:
+            if distance > self._move and self.ended != BURST:
                 self._snapped(number, to, last)
             if self.ended != CONVERGED:
                 return
             t = to
-            if distance < 0.4 * MOVE:
+            if distance < 0.4 * self._move:
                 size = min(2 * size, 1.0 / increments)
 
     def _relax(self, pressure: Array) -> None:
         state = self.state + self._rng.normal(0.0, self._kick, self.state.shape)
-        self.reach(float(state[:, 3].max()) + MOVE)
+        self.reach(float(state[:, 3].max()) + self._move)
         for _ in range(8):
             before = state.copy()
             self.ended, self.residual, steps, _ = relax(
