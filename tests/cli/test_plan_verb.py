@@ -49,3 +49,11 @@ def test_mistakes_are_one_line_and_status_2(capsys, arguments, words):
     assert words in err
     assert not out
     assert len(err.strip().splitlines()) == 1
+
+
+def test_the_picture_is_drawn(capsys, tmp_path):
+    path = tmp_path / "plan.png"
+    status, _, err = run(capsys, "plan", "13.9", *["11.88"] * 6, "--plot", str(path))
+    assert status == 0
+    assert "wrote" in err
+    assert path.read_bytes()[:4] == b"\x89PNG"
