@@ -77,6 +77,13 @@ def test_what_is_sent_is_the_height_alone(model, up):
     assert last.predicted_mm[0] > last.target_mm[0] + 1.5
 
 
+def test_a_branch_that_is_left_and_found_again(model):
+    """Bubble 0 hangs between 1 and 4 by 0.7 mm, close to where it falls; Newton overshoots and has to snap back up."""
+    pressure = np.array([25.023, 23.848, 21.363, 21.82, 25.353, 21.155, 20.149]) * 1e3
+    asked = model.settle(steps_of(((3, 6), (0, 1, 2, 4, 5)), pressure, np.zeros(7))).height_mm
+    assert bs.plan(asked, LAYOUT, contact=model).error_mm < 0.05
+
+
 def test_bubbles_that_do_not_touch_go_together_uncorrected(model):
     asked = np.array([9.0, 6, 7, 8, 9, 7, 6])
     plan = bs.plan(asked, LAYOUT, contact=model)
