@@ -1,7 +1,6 @@
 """`bubbleskin plan`: how to get a shape of bubbles that touch."""
 
 import json as jsonlib
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,7 +66,10 @@ def plan(
         start = find(shapes.numbers(begin.split(",")), layout, contact=contact).shape if begin else None
         found = find(asked, layout, contact=contact, start=start, progress=report)
     if plot:
-        import_module("bubbleskin.plot.contact").draw_plan(found, plot)
+        from bubbleskin.plot.contact import plot_plan
+        from bubbleskin.plot.membrane import save
+
+        save(plot_plan(found, contact, start), plot)
         click.echo(f"wrote {plot}", err=True)
     if json:
         click.echo(jsonlib.dumps(_facts(found), indent=2))

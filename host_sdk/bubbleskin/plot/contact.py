@@ -117,11 +117,10 @@ def plot_plan(plan: Plan, contact: CompliantContact, start: Shape | None = None)
     """A plan: the array after every step, from above and from the side; the last with what was asked."""
     shapes: list[Shape] = []
     now = start
-    for step in plan.steps:
-        now = contact.settle([step.pressure], start=now)
+    for step in plan.steps[:-1]:
+        now = contact.settle([step.pressure], start=now, ramp="height")
         shapes.append(now)
-    if not shapes:
-        shapes = [plan.shape]
+    shapes.append(plan.shape)
     titles = [f"step {k + 1}: {plan.layout.names(step.bubbles)}" for k, step in enumerate(plan.steps)] or ["no step"]
     with rc_context(STYLE):
         n = len(shapes)

@@ -13,7 +13,7 @@ from bubbleskin.physics import YeohBalloon
 from bubbleskin.physics.balloon import ATMOSPHERE
 from bubbleskin.physics.checks import finite, number, one_of, positive
 from bubbleskin.shape import energy as core
-from bubbleskin.shape.path import Outcome, Snap, Walker, ramps
+from bubbleskin.shape.path import HALVINGS, MOVE, Outcome, Snap, Walker, ramps
 from bubbleskin.shape.relax import BURST, CONVERGED, evaluate, hold, solve
 
 Array = NDArray[np.float64]
@@ -134,17 +134,21 @@ class CompliantContact:
         *,
         ramp: Ramp = "pressure",
         increments: int | None = None,
+        move_mm: float = 1e3 * MOVE,
+        halvings: int = HALVINGS,
         strict: bool = False,
     ) -> Shape:
         """Follow `steps`, (k, n) gauge pressures in Pa, one after the other from `start` (flat without one).
 
         On the way to a step all pressures change in proportion; with `ramp="height"` the heights that the bubbles would
-        have alone do, as on a device. The result is where the bubbles are after the last step.
+        have alone do, as on a device. The result is where the bubbles are after the last step. An increment that moves
+        a bubble further than `move_mm` is halved, up to `halvings` times; where that does not help, it is a snap.
 
         `Shape.converged` is False where no equilibrium was found, `residual` the force that is left then; with
         `strict` that raises `NoEquilibrium`. Raises `InvalidInput` for pressures that no bubble holds.
         """
         targets = self._pressures(steps)
+        positive("move_mm", number("move_mm", move_mm), "mm")
         one_of("ramp", ramp, ("pressure", "height"))
         if start is not None and len(start) != len(self):
             raise InvalidInput(f"The shape to start from has {len(start)} bubbles, the layout {len(self)}.")
@@ -154,12 +158,12 @@ class CompliantContact:
             radii = [self.free_radius(begin, None if start is None else start.radius)]
             for target in targets:
                 radii.append(self.free_radius(target, radii[-1]))
+        state = self._flat() if start is None else start.state
         walker = Walker(
-            self.bubbles, self.springs, self._flat() if start is None else start.state, self.kick, self.seed
+            self.bubbles, self.springs, state, kick=self.kick, seed=self.seed, move=1e-3 * move_mm, halvings=halvings
         )
-        for number_, pressures in enumerate(
-            ramps(begin, targets, None if radii is None else np.array(radii), self.bubbles)
-        ):
+        path = ramps(begin, targets, None if radii is None else np.array(radii), self.bubbles)
+        for number_, pressures in enumerate(path):
             walker.step(number_, pressures, self.increments if increments is None else increments)
             if walker.ended != CONVERGED:
                 break
@@ -232,14 +236,14 @@ class CompliantContact:
     def _evaluate(self, state: Array, pressure: ArrayLike) -> tuple[float, Array]:
         state = np.ascontiguousarray(state, dtype=float)
         p = np.array(np.broadcast_to(np.asarray(pressure, dtype=float), (len(self),)))
-        walker = Walker(self.bubbles, self.springs, state, 0.0, 0)
+        walker = Walker(self.bubbles, self.springs, state)
         aside = np.hypot(state[:, 0] - self.bubbles["x"], state[:, 1] - self.bubbles["y"]).max()
         walker.reach(float(state[:, 3].max() + aside))
         out = np.empty_like(state)
         return float(evaluate(state, p, self.bubbles, walker.springs, walker.pairs, out)), out
 
     def _walker(self, shape: Shape) -> Walker:
-        walker = Walker(self.bubbles, self.springs, shape.state, self.kick, self.seed)
+        walker = Walker(self.bubbles, self.springs, shape.state)
         aside = np.hypot(shape.state[:, 0] - self.bubbles["x"], shape.state[:, 1] - self.bubbles["y"]).max()
         walker.reach(float(shape.radius.max() + aside))
         return walker

@@ -6,6 +6,7 @@ few steps of Newton find the pressures of a shape. Which branch that is, the pat
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,8 @@ GOAL_MM = 0.02
 """Newton ends here."""
 _STRIDE_MM = 1.0  # of free height: as far as a slope is trusted
 _TURNS = 15
-_COARSE = 4  # increments of a correction, which is short
+_WORTH = 0.05  # of the squared error: a turn that gains less is the last
+_COARSE: dict[str, Any] = {"increments": 4, "move_mm": 0.5, "halvings": 5}  # a correction is short
 
 
 def correct(model: CompliantContact, shape: Shape, heights_mm: Array, highest: Array) -> Shape:
@@ -46,20 +48,27 @@ def correct(model: CompliantContact, shape: Shape, heights_mm: Array, highest: A
         nearer = _nearer(model, shape, heights_mm, change, highest)
         if nearer is None:
             break
+        gained = 1 - _misfit(nearer, heights_mm) / _misfit(shape, heights_mm)
         shape = nearer
+        if gained < _WORTH:
+            break
     return shape
+
+
+def _misfit(shape: Shape, heights_mm: Array) -> float:
+    return float(((heights_mm - shape.height_mm) ** 2).sum())
 
 
 def _nearer(model: CompliantContact, shape: Shape, heights_mm: Array, change: Array, highest: Array) -> Shape | None:
     """`shape` after as much of `change` as keeps to its branch and comes nearer, or else snaps nearer; None if nothing does."""
     snapped = None
-    error = float(((heights_mm - shape.height_mm) ** 2).sum())
+    error = _misfit(shape, heights_mm)
     for share in (1.0, 0.4, 0.15, 0.05):
         pressure = np.clip(shape.pressure + share * change, 0.0, highest)
         if np.abs(pressure - shape.pressure).max() < 0.1:
             break
-        trial = model.settle([pressure], start=shape, increments=_COARSE)
-        if trial.converged and float(((heights_mm - trial.height_mm) ** 2).sum()) < error:
+        trial = model.settle([pressure], start=shape, **_COARSE)
+        if trial.converged and _misfit(trial, heights_mm) < error:
             if not trial.snaps:
                 return trial
             snapped = snapped or trial

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bubbleskin.shape.energy import SPRINGS
-from bubbleskin.shape.relax import BURST, CONVERGED, hold, relax
+from bubbleskin.shape.relax import BURST, CONVERGED, extent, hold, relax
 
 Array = NDArray[np.float64]
 Records = NDArray[Any]
 
 MOVE = 0.25e-3
 """m. An increment that moves a bubble further is halved."""
-FINEST = 1 / 1024
-"""Of an increment: what is not smooth at this size is a snap."""
+HALVINGS = 10
+"""Of an increment, at most: what is not smooth then is a snap."""
 TRUST = 0.3e-3
 """m. Longest single Newton step of a bubble: short enough to stay in the valley that it is in."""
 TOLERANCE = 1e-7
@@ -57,23 +57,30 @@ class Outcome(NamedTuple):
     increments: int
 
 
-def _moved(a: Array, b: Array) -> float:
-    """The furthest that any bubble's four coordinates are from each other, m."""
-    return float(np.sqrt(((a - b) ** 2).sum(axis=1).max()))
-
-
 class Walker:
     """A state that is led along pressures; what stays the same on the way: bubbles, springs, pairs, kicks."""
 
-    def __init__(self, bubbles: Records, springs: tuple[float, ...], state: Array, kick: float, seed: int) -> None:
+    def __init__(
+        self,
+        bubbles: Records,
+        springs: tuple[float, ...],
+        state: Array,
+        *,
+        kick: float = 0.0,
+        seed: int = 0,
+        move: float = MOVE,
+        halvings: int = HALVINGS,
+    ) -> None:
         self.bubbles, self.state = bubbles, state.copy()
         self.springs = np.array([springs], SPRINGS)[0]
         self._barbs = np.column_stack([bubbles["x"], bubbles["y"]])
         self._tree = cKDTree(self._barbs)
+        self._move, self._finest = move, 0.5**halvings
         self._kick, self._rng = kick, np.random.default_rng(seed)
         self._trace = np.empty(LIMIT + 1)
         self._leeway = _LEEWAY
         self._reach = 0.0
+        self._radius = float(state[:, 3].max())
         self.snaps: list[Snap] = []
         self.increments = 0
         self.residual, self.energy, self.ended = 0.0, 0.0, CONVERGED
@@ -95,37 +102,37 @@ class Walker:
                 to = 1.0
             last = self.state
             pressure = pressures(to)
-            self._relax(pressure)
+            distance = self._relax(pressure)
             self.increments += 1
-            distance = _moved(last, self.state)
-            finest = size <= 1.001 * FINEST / increments
-            if (distance > MOVE or self.ended != CONVERGED) and not finest:
+            finest = size <= 1.001 * self._finest / increments
+            if (distance > self._move or self.ended != CONVERGED) and not finest:
                 self.state, size = last, size / 2
                 continue
-            if distance > MOVE and self.ended != BURST:
+            if distance > self._move and self.ended != BURST:
                 self._snapped(number, to, last)
             if self.ended != CONVERGED:
                 return
             t = to
-            if distance < 0.4 * MOVE:
+            if distance < 0.4 * self._move:
                 size = min(2 * size, 1.0 / increments)
 
-    def _relax(self, pressure: Array) -> None:
-        state = self.state + self._rng.normal(0.0, self._kick, self.state.shape)
-        self.reach(float(state[:, 3].max()) + MOVE)
+    def _relax(self, pressure: Array) -> float:
+        """Relax at `pressure`; returns how far that moved a bubble."""
+        begin = self.state + self._rng.normal(0.0, self._kick, self.state.shape)
+        self.reach(self._radius + self._move)
         for _ in range(8):
-            before = state.copy()
+            state = begin.copy()
             self.ended, self.residual, steps, _ = relax(
                 state, pressure, self.bubbles, self.springs, self.pairs, TRUST, TOLERANCE, LIMIT, self._trace
             )
-            aside = float(np.sqrt(((state[:, :2] - self._barbs) ** 2).sum(axis=1).max()))
-            if aside <= self._leeway and 2 * (state[:, 3].max() + aside) <= self._reach:
+            self._radius, aside, distance = extent(state, self.state, self.bubbles)
+            if aside <= self._leeway and 2 * (self._radius + aside) <= self._reach:
                 break
             self._leeway = max(self._leeway, 1.2 * aside)  # too few pairs were looked at: again with more
-            self.reach(float(state[:, 3].max()))
-            state = before
+            self.reach(self._radius)
         self.energy, self._drop = float(self._trace[steps]), float(self._trace[0] - self._trace[steps])
         self.state = state
+        return float(distance)
 
     def _snapped(self, number: int, fraction: float, last: Array) -> None:
         distance = np.sqrt(((self.state - last) ** 2).sum(axis=1))

@@ -24,7 +24,7 @@ LIMIT_MM = 14.0
 """Highest a bubble may be alone: the boards' own limit."""
 TOLERANCE_MM = 0.2
 """A bubble within it has the height asked for."""
-_SCREEN = 8  # increments per step while many orders are tried
+_SCREEN: dict[str, Any] = {"increments": 8, "move_mm": 1.0, "halvings": 6}  # while many orders are tried
 _FIRST, _BRANCHES, _TWOS, _THREES = 3, 60, 160, 200  # orders tried at most
 _CORRECTED = 8  # of those, branches whose pressures are sought
 _LIFTED_MM = 0.3
@@ -176,7 +176,7 @@ class _Search:
         for order in islice(pairs(self.first, self.guess, self.model.layout.neighbours, wrong), _BRANCHES):
             if self.target is not None or len(seen) > _CORRECTED:
                 return
-            end = self._follow(steps_of(order, self.guess, self.begin), _SCREEN)
+            end = self._follow(steps_of(order, self.guess, self.begin), **_SCREEN)
             branch = tuple(end.lifted_mm > _LIFTED_MM)
             if branch not in seen:
                 seen.add(branch)
@@ -210,11 +210,11 @@ class _Search:
     def _off(self, shape: Shape) -> float:
         return float(np.abs(shape.height_mm - self.asked).max())
 
-    def _follow(self, steps: Array, increments: int | None = None) -> Shape:
+    def _follow(self, steps: Array, **how: Any) -> Shape:
         self.tried += 1
         if self.progress:
             self.progress(self.tried, self.error)
-        return self.model.settle(steps, self.start, ramp="height", increments=increments)
+        return self.model.settle(steps, self.start, ramp="height", **how)
 
     def _corrected(self, shape: Shape) -> Shape:
         found = correct(self.model, shape, self.asked, self.highest)

@@ -247,8 +247,22 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
         for i in range(len(radius)):
             out[i] = membrane(radius[i], bubbles[i])[1]
 
-    return relax, solve, evaluate, hold
+    @njit(cache=True)
+    def extent(state, last, bubbles):  # type: ignore[no-untyped-def]
+        """The largest radius, the furthest aside of a barb, and the furthest that any bubble is from where it was `last`."""
+        _ = stamp
+        radius = aside = moved = 0.0
+        for i in range(len(state)):
+            radius = max(radius, state[i, 3])
+            aside = max(aside, (state[i, 0] - bubbles[i].x) ** 2 + (state[i, 1] - bubbles[i].y) ** 2)
+            distance = 0.0
+            for k in range(4):
+                distance += (state[i, k] - last[i, k]) ** 2
+            moved = max(moved, distance)
+        return radius, math.sqrt(aside), math.sqrt(moved)
+
+    return relax, solve, evaluate, hold, extent
 
 
 _FILES = (balloon, wall, energy)
-relax, solve, evaluate, hold = _compile(zlib.crc32("".join(map(inspect.getsource, _FILES)).encode()))
+relax, solve, evaluate, hold, extent = _compile(zlib.crc32("".join(map(inspect.getsource, _FILES)).encode()))
