@@ -6,16 +6,16 @@
 The frames are made here from the schema with struct, zlib and a textbook COBS encoder, not with the code
 that they test.
 
-`tests/protocol/sessions/<protocol>-<firmware>.json` is a conversation of SDK and firmware of this version: what was sent and what was
-answered, tick by tick. Once a version is released its file stays as it is, and every later version must
-understand both sides of it.
+`tests/protocol/sessions/<protocol>-<firmware>.json` is a conversation of SDK and firmware of this version: what
+was sent and what was answered, tick by tick. Once a version is released its file stays as it is, and every later
+version must understand both sides of it.
 """
 
 import json
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
 from array import array
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import generated
@@ -35,9 +35,7 @@ RANGES = {
 }
 TEXTS = {"least": "", "example": "wristband7", "greatest": "~" * 16}
 EXAMPLE_BUBBLES = 7
-SESSION_PATH = Path(
-    f"tests/protocol/sessions/{version.PROTOCOL_MAX}-{'.'.join(map(str, version.FIRMWARE))}.json"
-)
+SESSION_PATH = Path(f"tests/protocol/sessions/{version.PROTOCOL_MAX}-{'.'.join(map(str, version.FIRMWARE))}.json")
 BOOT_ID, SESSION = 1, 0x12345678
 
 Field = tuple[str, int, str, int | None, int | None, str]

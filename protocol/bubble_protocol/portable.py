@@ -26,7 +26,7 @@ except ImportError:
 
         @staticmethod
         def viper(function):
-            """Leave the function as it is, but for casting arguments that are annotated as pointers to other than bytes or words."""
+            """Leave the function as it is, but for casting the arguments that are annotated as pointers to half words."""
             code = function.__code__
             casts = []
             for name in code.co_varnames[: code.co_argcount]:
