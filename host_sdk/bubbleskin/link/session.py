@@ -106,8 +106,11 @@ class Link:
             try:
                 for request in requests:
                     self._window.submit(request)
-                await self._ready(requests[0])
-                await self.wait(deadline, lambda: all(request.done for request in requests))
+                while open_ones := [request for request in requests if not request.done]:
+                    if self.transport.now() >= deadline:
+                        break
+                    await self._ready(open_ones[0])  # again, where another call's silence has ended the session
+                    await self.wait(deadline, lambda: not self.open or all(request.done for request in requests))
             finally:
                 for request in requests:
                     if not request.done:
