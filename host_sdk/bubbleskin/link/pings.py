@@ -1,0 +1,48 @@
+"""PING and its reply: the one request that has no turn, changes nothing and tells the time. No I/O, no clock."""
+
+from bubble_protocol import messages
+from bubbleskin.link import wire
+
+_KEPT = 16
+
+
+class Pings:
+    """The PINGs that have been sent and not been answered yet."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        """Of the last one sent."""
+        self._sent: dict[int, float] = {}  # when, by number
+        self._answers: dict[int, wire.Received] = {}
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the last one has not been answered."""
+        return self.number in self._sent
+
+    def answer(self, number: int) -> wire.Received | None:
+        """The reply to PING `number`, where it has come."""
+        return self._answers.get(number)
+
+    def forget(self) -> None:
+        """A new session: what was sent before is not answered any more."""
+        self._sent.clear()
+        self._answers.clear()
+
+    def frame(self, token: int, now: float, key: bytes) -> bytes:
+        """One more."""
+        self.number = self.number + 1 & 0xFFFF
+        if len(self._sent) > _KEPT:
+            self._sent.clear()
+        self._sent[self.number] = now
+        return wire.encode("PING", self.number, (token,), key=key)
+
+    def settle(self, message: wire.Received) -> float | None:
+        """When the PING was sent that this replies to; None where there is none."""
+        sent_at = self._sent.pop(message.sequence, None)
+        if sent_at is None or message.id != messages.PING | messages.REPLY:
+            return None
+        if len(self._answers) > _KEPT:
+            self._answers.clear()
+        self._answers[message.sequence] = message
+        return sent_at
