@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 GENERATORS := nominal_table golden_vectors protocol_page cli_page draw_demo draw_membrane_figures
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip check lint generated micropython bench day generate clean
+.PHONY: help setup demo test chip check lint generated micropython bench day soak fuzz generate clean
 
 help: ## what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -49,6 +49,12 @@ generate: setup ## write all generated files
 
 micropython: setup ## build the real MicroPython that the tests run on, once
 	$(BIN)/python tools/build_micropython.py
+
+soak: setup ## a million commands over a line that fails, ten minutes
+	$(BIN)/python tools/soak.py
+
+fuzz: setup ## look for bytes that harm the firmware, ten minutes; keeps what it finds in tests/firmware/corpus.txt
+	$(BIN)/python tools/fuzz.py
 
 bench: setup ## measure speeds
 	$(BIN)/bubbleskin bench

@@ -1,20 +1,28 @@
-"""Write `tests/protocol/golden.json`: every message with example and extreme values, and its frame.
+"""Write `tests/protocol/golden.json`: every message with example and extreme values, and its frame; and one session.
 
     python tools/golden_vectors.py            # write it
     python tools/golden_vectors.py --check    # fail if it is not what would be written
 
 The frames are made here from the schema with struct, zlib and a textbook COBS encoder, not with the code
 that they test.
+
+`tests/protocol/sessions/<protocol>-<firmware>.json` is a conversation of SDK and firmware of this version: what
+was sent and what was answered, tick by tick. Once a version is released its file stays as it is, and every later
+version must understand both sides of it.
 """
 
 import json
 import struct
 import zlib
+from array import array
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import generated
+from bubble_firmware import boards
 from bubble_protocol import codec, framing, messages, version
+from bubbleskin.link import wire
+from bubbleskin.sim.board import InProcessFirmware
 
 PATH = Path("tests/protocol/golden.json")
 
@@ -35,6 +43,8 @@ RANGES = {
 }
 TEXTS = {"least": "", "example": "wristband7", "greatest": "~" * 16}
 EXAMPLE_BUBBLES = 7
+SESSION_PATH = Path(f"tests/protocol/sessions/{version.PROTOCOL_MAX}-{'.'.join(map(str, version.FIRMWARE))}.json")
+BOOT_ID, SESSION = 1, 0x12345678
 
 Field = tuple[str, int, str, int | None, int | None, str]
 
@@ -114,5 +124,39 @@ def text() -> str:
     return f'{json.dumps(head)[:-1]}, "vectors": [\n{lines}\n]}}\n'
 
 
+def session() -> str:
+    """A conversation with a wristband at rest: every request that an SDK of this version makes."""
+    board = boards.load("wristband7")
+    firmware = InProcessFirmware(board, BOOT_ID)
+    counts = array("H", [board.SENSOR_ZERO] * board.BUBBLES + [2560])
+    key = wire.session_key(BOOT_ID, SESSION)
+    shape = [(9000 + 100 * bubble,) for bubble in range(board.BUBBLES)]
+    asked: list[tuple[str, tuple[int, ...], list[tuple[int, ...]]]] = [
+        ("INFO", (), []),
+        ("SUBSCRIBE", (3,), []),
+        ("SHOW", (200,), shape),
+        ("STATE", (), []),
+        ("TABLE_READ", (2, 40), []),
+        ("TABLE_WRITE", (1, 0, 3), [(5000, 0), (9000, 20000), (14000, 40000)]),
+        ("TABLE_COMMIT", (1,), []),
+        ("SUBSCRIBE", (0,), []),
+        ("SHOW", (0,), shape[1:]),
+        ("STOP", (), []),
+        ("VENT", (), []),
+        ("CLEAR", (), []),
+        ("TICKS", (), []),
+        ("RESTART", (0,), []),
+    ]
+    sent = [wire.encode("HELLO", 1, (version.PROTOCOL_MIN, version.PROTOCOL_MAX, SESSION))]
+    sent.append(wire.encode("PING", 1, (7,), key=key))
+    for number, (name, fixed, rows) in enumerate(asked, 1):
+        sent += [wire.encode(name, number, fixed, rows, key), b"", b""]
+    sent.append(sent[-6])  # TICKS once more: answered from the replies kept
+    lines = [{"sent": data.hex(), "received": firmware.tick(counts, data).link.hex()} for data in sent]
+    head = {"boot_id": BOOT_ID, "session": SESSION}
+    ticks = ",\n".join(json.dumps(line) for line in lines)
+    return f'{json.dumps(head)[:-1]}, "ticks": [\n{ticks}\n]}}\n'
+
+
 if __name__ == "__main__":
-    generated.main({PATH: text})
+    generated.main({PATH: text, SESSION_PATH: session})

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import generated
+from bubble_firmware import delivery
 from bubble_protocol import codec, framing, messages, steps, version
 from bubbleskin.link import wire
 
@@ -29,7 +30,7 @@ of its schema is `0x{schema:08x}`.
 | 1 | id of the message |
 | 2 | sequence number |
 | 0 to {payload} | payload |
-| {crc} | CRC-32 (as in zlib) of id, sequence number and payload |
+| {crc} | CRC-32 (as in zlib) of id, sequence number and payload, XORed with the key |
 | 1 | `0x00`, the end of the frame |
 
 All numbers are little-endian. Id to CRC together are the content, at most {content} bytes. Consistent overhead byte
@@ -41,19 +42,33 @@ A receiver takes bytes up to a zero. What is too short, too long, no COBS or has
 the next frame is understood. A zero alone means nothing, so a host begins with one: it ends whatever half frame
 stood on the line.
 
+The key is what both ends know and neither sends: the CRC-32 of boot id and session, each four bytes. So a frame of
+another boot or of another session is no frame here. HELLO, its reply and ERROR about HELLO have no key: they are how
+it is agreed on, and must be understood by every version.
+
 ```python
 >>> from bubbleskin.link import wire
->>> wire.encode("PING", 0x0102, (7,)).hex(" ")
+>>> wire.session_key(boot_id=1, session=2).hex(" ")
+'{key}'
+>>> wire.encode("PING", 0x0102, (7,), key=wire.session_key(1, 2)).hex(" ")
 '{ping}'
 
 ```
 
 ## Requests and replies
 
-The host asks, the wristband answers each request once, in order: with the reply, whose id is the request's plus
-`0x{reply:02x}`, or with ERROR. Both carry the request's sequence number, which the host counts up modulo 65536. The host
-keeps one request under way (`window` in HELLO's reply). Where no answer comes it sends the same frame again, with the
-same number: in this version every request may be handled twice with the same outcome.
+The host asks, the wristband answers each request once: with the reply, whose id is the request's plus
+`0x{reply:02x}`, or with ERROR. Both carry the request's sequence number.
+
+HELLO opens the session whose number it carries, any but 0, unless that is open already: then nothing changes. One of
+the last sixteen sessions is refused with `overtaken`, so that a late repetition harms nobody. In a new session
+numbers begin with 1 and count up modulo 65536; there is no telemetry.
+
+`window` requests may be under way at once. They are applied in the order of their numbers, whatever order they come
+in. Where no answer comes the host sends the same frame again; the wristband keeps its last {kept} replies and answers
+from them. STOP and VENT are applied the moment they come, up to {ahead} numbers ahead of their turn: every number that
+they skip is answered with `overtaken` and never applied. HELLO and PING have no turn: they are answered at once, and
+their numbers are their own. What is farther from its turn is dropped. See [the link](link.md).
 
 A request takes effect in the tick after the one that it arrives in.
 
@@ -70,7 +85,11 @@ wristband vents.
 
 HELLO tells the wristband which protocols the host speaks, its reply which ones the wristband does. They use the
 newest that both speak; where there is none, the wristband refuses with `no_common_protocol` and the host says which
-side to update. Fields are only ever appended. `schema_crc` tells whether both have the very same schema: it is the
+side to update. Fields are only ever appended, to messages without a repeated group. Both ends take the fields that
+they know and ignore what follows; where an older peer sends fewer, those that are missing are 0. So an appended field
+must mean nothing when it is 0 and must do no harm when it is ignored; what cannot be ignored is a bit of
+`capabilities`, or another message.
+`schema_crc` tells whether both have the very same schema: it is the
 CRC-32 of all ids, names, field names and kinds, as `bubble_protocol.codec.schema_bytes` writes them. `boot_id` is
 another number after every boot, so that a host notices when the wristband has forgotten everything.
 
@@ -171,7 +190,10 @@ def page() -> str:
         overhead=framing.OVERHEAD,
         frame=framing.FRAME_MAX,
         reply=messages.REPLY,
-        ping=wire.encode("PING", 0x0102, (7,)).hex(" "),
+        ping=wire.encode("PING", 0x0102, (7,), key=wire.session_key(1, 2)).hex(" "),
+        key=wire.session_key(1, 2).hex(" "),
+        kept=delivery.KEPT,
+        ahead=delivery.KEPT - 1,
         head=steps.HEAD,
         ms=steps.MS_MAX,
         low=steps.TOLERANCE_MIN_UM,
@@ -187,6 +209,7 @@ def page() -> str:
         errors=enumeration(messages.ERRORS, "error").rstrip(),
     )
     parts = [head]
+    parts += ["## Capabilities\n", "Bits.\n", enumeration(messages.CAPABILITIES, "bit")]
     parts += ["## Mode of the board\n", enumeration(messages.MODES, "mode")]
     parts += ["## Status of a bubble\n", enumeration(messages.STATUSES, "status")]
     parts += ["## Faults of a bubble\n", "Bits; they stay until CLEAR.\n", enumeration(messages.FAULTS, "bit")]

@@ -9,6 +9,7 @@ from bubble_firmware import control
 from bubble_firmware.table import KNOTS_MAX
 from bubble_firmware.ticks import BINS
 from bubble_protocol import messages
+from bubble_protocol.messages import IDLE
 from bubble_protocol.portable import heap_free
 
 _KNOTS_PER_MESSAGE = 48

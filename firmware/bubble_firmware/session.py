@@ -17,7 +17,7 @@ from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
 
 _CHUNK = 256  # bytes taken from the link in one tick
 _PAYLOAD_AT = framing.Decoder.PAYLOAD_AT
-_BUDGET = 4  # requests handled in one tick; one that takes long is worth as many
+_BUDGET = 2  # requests handled in one tick, of nearly 1 ms each on the chip; one that takes long is worth as many
 _HELLO = const(0x01)
 _PING = const(0x02)
 _STOP = const(0x0B)

@@ -12,8 +12,8 @@ from bubbleskin import safety
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import Clock
-from bubbleskin.link.pings import PINGS, ping
 from bubbleskin.link.session import Link, drive
+from bubbleskin.link.synchronise import PINGS, ping
 from bubbleskin.link.transport import Transport
 from bubbleskin.link.wire import Received, crc32
 from bubbleskin.playing import Played, Player, Playing, Progress

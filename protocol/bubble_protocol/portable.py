@@ -28,13 +28,13 @@ except ImportError:
 
         @staticmethod
         def viper(function):
-            """Leave the function as it is, but for casting the arguments that are annotated as pointers."""
+            """Leave the function as it is, but for casting the arguments that are annotated as pointers to half words."""
             code = function.__code__
             casts = []
             for name in code.co_varnames[: code.co_argcount]:
                 kind = function.__annotations__.get(name)
-                casts.append(kind if kind in (ptr8, ptr16, ptr32) else None)
-            if ptr16 not in casts:  # the others are the buffer itself
+                casts.append(kind if kind is ptr16 else None)  # the others leave a buffer as it is
+            if not any(casts):
                 return function
 
             def called(*arguments):

@@ -68,6 +68,7 @@ def connecting(url):
         ("sim:wristband7", ["sim://wristband7"]),
         ("sim://wristband7?seed=-1", ["seed is -1"]),
         ("sim://wristband7?seed", ["seed=''"]),
+        ("sim://wristband7?loss=2", ["drop is 2", "0 to 1"]),
         ("sim://wristband7?spread=0.6", ["spread is 0.6", "0 to 0.5"]),
         ("sim://wristband7?spread=nan", ["spread is nan"]),
         ("micropython://wristband7?spread=-1", ["spread is -1"]),

@@ -1,17 +1,48 @@
-"""Pings for a clock, a handful at once."""
+"""PING and its reply: the one request that has no turn, changes nothing and tells the time. No I/O, no clock."""
 
-from bubbleskin.link.clock import Clock
-from bubbleskin.link.session import Link
+from bubble_protocol import messages
+from bubbleskin.link import wire
 
-PINGS = 20
-_PAUSE = 1.3e-3  # seconds, and up to seven times that: not in step with the device's ticks
+_KEPT = 16
 
 
-async def ping(link: Link, clock: Clock, pings: int = PINGS) -> None:
-    """Send so many pings one after another; the clock hears of each."""
-    for number in range(pings):
-        sent = link.transport.now()
-        reply = await link.call("PING", (number,))
-        if link.on_ping != clock.hear:  # else it has heard already
-            clock.hear(sent, reply, link.transport.now())
-        await link.wait(link.transport.now() + _PAUSE * (1 + number % 7))
+class Pings:
+    """The PINGs that have been sent and not been answered yet."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        """Of the last one sent."""
+        self._sent: dict[int, float] = {}  # when, by number
+        self._answers: dict[int, wire.Received] = {}
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the last one has not been answered."""
+        return self.number in self._sent
+
+    def answer(self, number: int) -> wire.Received | None:
+        """The reply to PING `number`, where it has come."""
+        return self._answers.get(number)
+
+    def forget(self) -> None:
+        """A new session: what was sent before is not answered any more."""
+        self._sent.clear()
+        self._answers.clear()
+
+    def frame(self, token: int, now: float, key: bytes) -> bytes:
+        """One more."""
+        self.number = self.number + 1 & 0xFFFF
+        if len(self._sent) > _KEPT:
+            self._sent.clear()
+        self._sent[self.number] = now
+        return wire.encode("PING", self.number, (token,), key=key)
+
+    def settle(self, message: wire.Received) -> float | None:
+        """When the PING was sent that this replies to; None where there is none."""
+        sent_at = self._sent.pop(message.sequence, None)
+        if sent_at is None or message.id != messages.PING | messages.REPLY:
+            return None
+        if len(self._answers) > _KEPT:
+            self._answers.clear()
+        self._answers[message.sequence] = message
+        return sent_at

@@ -1,7 +1,9 @@
 """What is said when a link fails."""
 
+from bubble_protocol import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.errors import DeviceRestarted, DeviceSilent, LinkError
+from bubbleskin.errors import DeviceRestarted, DeviceSilent, LinkError, WrongDevice
+from bubbleskin.link import wire
 from bubbleskin.link.window import Request
 
 _UNKNOWN = "Whether it was applied is unknown; it will not be applied any more."
@@ -59,6 +61,15 @@ def version(low: int, high: int) -> str:
     if high < PROTOCOL_MIN:
         return f"The wristband speaks {theirs}, this SDK {PROTOCOL_MIN} and newer: update the wristband's firmware."
     return f"The wristband speaks {theirs}, this SDK at most {PROTOCOL_MAX}: update it with `pip install --upgrade bubbleskin`."
+
+
+def refused_hello(reply: wire.Received) -> WrongDevice:
+    """The device has refused to open a session."""
+    if reply["error"] == messages.NO_COMMON_PROTOCOL:
+        return WrongDevice(version(reply["low"], reply["high"]))
+    if reply["error"] == messages.WRONG_LENGTH:  # it does not know of sessions
+        return WrongDevice(version(1, 1))
+    return WrongDevice(wire.explain(reply))
 
 
 def _fate(request: Request) -> str:

@@ -15,6 +15,7 @@ from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.errors import DeviceRefused, DeviceSilent, LinkError, Overtaken, WrongDevice
 from bubbleskin.link import keepalive, sentences, wire
 from bubbleskin.link.inbox import UNASKED, Inbox
+from bubbleskin.link.pings import Pings
 from bubbleskin.link.ticks import DeviceTicks
 from bubbleskin.link.transport import Transport
 from bubbleskin.link.window import Request, Window
@@ -63,9 +64,7 @@ class Link:
         self._hellos: dict[int, float] = {}  # when those were sent that asked for this session, by number
         self._hello = 0
         self._greeting: wire.Received | None = None
-        self._pings: dict[int, float] = {}  # when they were sent, by number
-        self._pongs: dict[int, wire.Received] = {}
-        self._ping = 0
+        self._pings = Pings()
         self._sent_at = 0.0
         self._asked_at = 0.0  # whether the device still is the same
         self._gone: LinkError | None = None  # why the port has gone
@@ -111,8 +110,11 @@ class Link:
             try:
                 for request in requests:
                     self._window.submit(request)
-                await self._ready(requests[0])
-                await self.wait(deadline, lambda: all(request.done for request in requests))
+                while open_ones := [request for request in requests if not request.done]:
+                    if self.transport.now() >= deadline:
+                        break
+                    await self._ready(open_ones[0])  # again, where another call's silence has ended the session
+                    await self.wait(deadline, lambda: not self.open or all(request.done for request in requests))
             finally:
                 for request in requests:
                     if not request.done:
@@ -173,7 +175,7 @@ class Link:
                 continue
             if reply.id == messages.ERROR:
                 if reply["error"] != messages.OVERTAKEN:
-                    raise _refused_hello(reply)
+                    raise sentences.refused_hello(reply)
                 self._new_session()
                 continue
             low, high = reply["protocol_min"], reply["protocol_max"]
@@ -223,7 +225,7 @@ class Link:
         key = wire.session_key(reply["boot_id"], self._session)
         self._window.begin(key, max(1, reply["window"]))
         self._reader.use(key)
-        self._pings.clear()
+        self._pings.forget()
         self.open = True
         if self.on_open:
             self.on_open(reply)
@@ -253,9 +255,7 @@ class Link:
 
     def service(self, now: float) -> None:
         """Send what is due: new requests, those that have not been answered, PING when nothing else was sent."""
-        if self._gone and not self._reopen(now):
-            return
-        if not self.open:
+        if (self._gone and not self._reopen(now)) or not self.open:
             return
         late = self._window.expired(now)
         if late:
@@ -278,36 +278,33 @@ class Link:
     @property
     def _quiet(self) -> float:
         """KEEP_ALIVE, less a few ms that differ: pings in step with the device's ticks would tell the clock the same again."""
-        return KEEP_ALIVE - self._ping % 7 * 1.3e-3
+        return KEEP_ALIVE - self._pings.number % 7 * 1.3e-3
 
     def tend(self) -> None:
         """What the thread that keeps the link alive does between calls; and take the reply to a PING when it comes."""
         now = self.transport.now()
         self.service(now)
-        if self._ping in self._pings:
-            drive(self.wait(now + _SLICE, lambda: self._ping not in self._pings))
+        if self._pings.waiting:
+            drive(self.wait(now + _SLICE, lambda: not self._pings.waiting))
         drive(self.wait(now + max(0.001, getattr(self.transport, "behind", 0.0))))
 
     def next_beat(self) -> float:
         """Seconds until `tend` is wanted."""
         return min(max(self._due() - self.transport.now(), 0.005), KEEP_ALIVE / 2)
 
-    def _send_ping(self, token: int, now: float) -> int:
-        self._ping = self._ping + 1 & 0xFFFF
-        if len(self._pings) > 16:
-            self._pings.clear()
-        self._pings[self._ping] = now
-        self._write(wire.encode("PING", self._ping, (token,), key=self._window.key), now)
-        return self._ping
+    def _send_ping(self, token: int, now: float) -> None:
+        self._write(self._pings.frame(token, now, self._window.key), now)
 
     async def _call_ping(self, request: Request) -> wire.Received:
         """PING has no place among the other requests: it changes nothing and is answered at once."""
         await self._ready(request)
         while (now := self.transport.now()) < request.deadline and self.open:
-            number = self._send_ping(request.fixed[0], now)
+            self._send_ping(request.fixed[0], now)
             request.sends += 1
-            await self.wait(min(request.deadline, now + self._window.trip.timeout), lambda n=number: n in self._pongs)  # type: ignore[misc]
-            if reply := self._pongs.pop(number, None):
+            number = self._pings.number
+            until = min(request.deadline, now + self._window.trip.timeout)
+            await self.wait(until, lambda n=number: self._pings.answer(n) is not None)  # type: ignore[misc]
+            if reply := self._pings.answer(number):
                 return reply
             if request.sends >= 2:
                 self._say_hello(now)
@@ -336,10 +333,9 @@ class Link:
 
     def _answered(self, message: wire.Received, now: float) -> None:
         """A reply to a PING."""
-        sent_at = self._pings.pop(message.sequence, None)
-        if sent_at is not None and message.id != messages.ERROR:
+        sent_at = self._pings.settle(message)
+        if sent_at is not None:
             self._window.trip.measured(now - sent_at)
-            self._pongs = {message.sequence: message}
             if self.on_ping:
                 self.on_ping(sent_at, message, now)
 
@@ -413,11 +409,3 @@ def drive(coroutine: Coroutine[Any, Any, _T]) -> _T:
         return finished.value
     coroutine.close()
     raise RuntimeError("a coroutine of the synchronous link has suspended")
-
-
-def _refused_hello(reply: wire.Received) -> LinkError:
-    if reply["error"] == messages.NO_COMMON_PROTOCOL:
-        return WrongDevice(sentences.version(reply["low"], reply["high"]))
-    if reply["error"] == messages.WRONG_LENGTH:  # it does not know of sessions
-        return WrongDevice(sentences.version(1, 1))
-    return WrongDevice(wire.explain(reply))

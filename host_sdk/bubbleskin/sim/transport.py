@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Protocol
 
 from bubbleskin.errors import InvalidInput, LinkError
+from bubbleskin.link.transport import Transport
 from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.faults import FaultLink, Faults
 from bubbleskin.sim.flash import NorFlash
 
 
@@ -31,6 +33,7 @@ class Board(Protocol):
         """End it."""
 
 
+_SHARES = ("spread", "loss")
 _BEHIND = 0.1  # seconds a real-time simulation may lag before it gives up catching up
 
 
@@ -110,6 +113,7 @@ class Options:
     seed: int = 0
     spread: float = 0.0
     realtime: bool = False
+    loss: float = 0.0
     contact: bool = True
     store: Path | None = None
     """The file that keeps its flash."""
@@ -130,23 +134,30 @@ class Options:
             if key == "store":
                 continue
             try:
-                values[key] = float(text) if key == "spread" else int(text)
+                values[key] = float(text) if key in _SHARES else int(text)
             except ValueError:
-                kind = "a number" if key == "spread" else "a whole number"
+                kind = "a number" if key in _SHARES else "a whole number"
                 raise InvalidInput(f"{url} has {key}={text!r}, which is not {kind}.") from None
         return cls(
             int(values.get("seed", 0)),
             values.get("spread", 0.0),
             bool(values.get("realtime", 0)),
+            values.get("loss", 0.0),
             bool(values.get("contact", 1)),
             Path(store) if store else None,
         )
 
 
-def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[SimulatedTransport, Board]:
+def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transport, Board]:
     """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it."""
     url = f"{scheme}://{name}"
     chosen = Options.parse(options, url)
+    faults = Faults(drop=chosen.loss)  # refused before anything is started
+    transport, board = _open(scheme, name, url, chosen)
+    return FaultLink(transport, faults, seed=chosen.seed) if chosen.loss else transport, board
+
+
+def _open(scheme: str, name: str, url: str, chosen: Options) -> tuple[SimulatedTransport, Board]:
     data = load_board(name)
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip

@@ -1,0 +1,163 @@
+"""On MicroPython, with right CRCs and numbers: every message, every field at its limits and past them, every length."""
+
+import itertools
+
+import pytest
+
+from bubble_firmware import boards
+from bubble_protocol import codec, framing, messages
+from bubble_protocol.crc import crc32_into
+from bubbleskin.link import wire
+
+SESSION = 0x13579BDF
+
+SCRIPT = """
+import gc, sys
+from bubble_firmware import boards, control
+from bubble_firmware.app import App
+
+class Hands:
+    boot_id = 1
+    late_ticks = 0
+    alarms = boot_faults = 0
+    self_test = False
+    line = b""
+    answers = 0
+    wide = 0
+    def sense(self, counts):
+        for i in range(len(counts)):
+            counts[i] = 1000 + 200 * i
+    def act(self, pulses, pump, dump):
+        for i in range(len(pulses)):
+            if pulses[i] > {tick_us}:
+                self.wide += 1
+    def vent(self):
+        pass
+    def receive(self, buffer):
+        line = self.line
+        size = min(len(line), len(buffer))
+        for i in range(size):
+            buffer[i] = line[i]
+        self.line = line[size:]
+        return size
+    def send(self, frame, length):
+        if frame[1] != 0x07:
+            self.answers += 1
+        return True
+    def alive(self, mode, faults):
+        pass
+    def tidy(self):
+        pass
+    def slack(self):
+        pass
+    def restart(self, into):
+        pass
+    def clear(self):
+        pass
+    def phase_us(self):
+        return 0
+
+hands = Hands()
+board = boards.load("{board}")
+app = App(board, hands)
+rows = app.bubbles._rows
+limit = board.HEIGHT_MAX_UM
+unanswered = beyond = frames = 0
+free = 0
+for line in sys.stdin:
+    frame = bytes.fromhex(line.strip())
+    before = hands.answers
+    hands.line = frame
+    app.tick()
+    while hands.line:
+        app.tick()
+    frames += 1
+    unanswered += hands.answers != before + 1
+    for bubble in range(board.BUBBLES):
+        at = bubble * control.ROW
+        if not 0 <= rows[at + control.TARGET] <= limit or rows[at + control.SETPOINT] > limit << 4:
+            beyond += 1
+    if frames == 300:
+        line = frame = None
+        gc.collect()
+        free = gc.mem_free()
+    if not frames % 100:
+        app.tick()
+line = frame = None
+gc.collect()
+print(frames, unanswered, beyond, hands.wide, app.exceptions, free - gc.mem_free())
+"""
+
+
+def sealed(message_id, number, payload):
+    frame = bytearray(framing.FRAME_MAX)
+    framing.put_header(frame, message_id, number & 0xFFFF)
+    frame[4 : 4 + len(payload)] = payload
+    return bytes(frame[: framing.seal(frame, framing.HEADER + len(payload), crc32_into, wire.session_key(1, SESSION))])
+
+
+def of_kind(kind, low, high):
+    """Values of a field: its limits, one past each, and the extremes of its kind."""
+    if kind == messages.TEXT:
+        return [b"\0" * 16, b"\xff" * 16]
+    size = kind & 15
+    top = (1 << 8 * size) - 1
+    numbers = {0, 1, top, top >> 1, (top >> 1) + 1}
+    for limit in (low, high):
+        if limit is not None:
+            numbers |= {limit - 1, limit, limit + 1}
+    return [(number & top).to_bytes(size, "little") for number in sorted(numbers)]
+
+
+def payloads(message, bubbles):
+    """One field at an edge and the others in the middle, for several numbers of entries; then everything of every length."""
+    counts = {0, 1, bubbles - 1, bubbles, bubbles + 1, 40} if message.repeated else {0}
+    for count in counts:
+        fields = [*message.fixed, *message.repeated * count]
+        middle = [of_kind(*field[1:2], *field[3:5])[2 if field[1] != messages.TEXT else 0] for field in fields]
+        for place, field in enumerate(fields[: len(message.fixed) + 2 * len(message.repeated)]):
+            for value in of_kind(field[1], field[3], field[4]):
+                yield b"".join([*middle[:place], value, *middle[place + 1 :]])
+    for size in range(framing.PAYLOAD_MAX + 1):
+        for byte in (0, 1, 0xFF):
+            yield bytes([byte]) * size
+
+
+def frames(board, every):
+    """One payload of so many of each message. HELLO, then everything; whoever opens another session would end this one."""
+    yield wire.encode("HELLO", 0, (2, 2, SESSION))
+    numbers = itertools.count(1)
+    heights = [(13000 - 100 * bubble).to_bytes(2, "little") for bubble in range(board.BUBBLES)]
+    yield sealed(messages.SHOW, next(numbers), b"".join([b"\0\0", *heights]))
+    for message in codec.BY_ID.values():
+        for payload in itertools.islice(payloads(message, board.BUBBLES), 0, None, every):
+            if message.id == messages.HELLO:
+                session = SESSION.to_bytes(4, "little") if len(payload) >= 6 else bytes(4)
+                payload = (payload[:2] + session)[: len(payload)] + payload[6:]
+            aside = message.id in (messages.HELLO, messages.PING)
+            if len(payload) <= framing.PAYLOAD_MAX:
+                yield sealed(message.id, 0 if aside else next(numbers), payload)
+    for message_id in range(256):
+        if message_id not in codec.BY_ID:
+            yield sealed(message_id, next(numbers), b"")
+            yield sealed(message_id, next(numbers), bytes(range(40)))
+    yield sealed(messages.PING, 0, b"last")
+
+
+@pytest.mark.parametrize(
+    ("name", "every"),
+    [
+        pytest.param("wristband7", 10, id="quick"),
+        pytest.param("wristband7", 1, id="all", marks=pytest.mark.slow),
+        pytest.param("wristband19", 1, id="all of 19", marks=pytest.mark.slow),
+    ],
+)
+def test_nothing_at_or_past_a_limit_does_harm(micropython, name, every):
+    board = boards.load(name)
+    lines = [frame.hex() for frame in frames(board, every)]
+    said = micropython(SCRIPT.format(board=name, tick_us=board.TICK_US), stdin="\n".join(lines) + "\n", timeout=600)
+    sent, unanswered, beyond, wide, exceptions, grown = map(int, said.split())
+    assert sent == len(lines) > 10_000 / every
+    assert unanswered == 0, "each was answered once"
+    assert (beyond, wide, exceptions) == (0, 0, 0)
+    assert grown == 0

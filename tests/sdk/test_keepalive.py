@@ -1,0 +1,107 @@
+"""A script that thinks keeps its shape: the wristband hears from it. One that has ended or let go does not."""
+
+import asyncio
+import gc
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import bubbleskin as bs
+
+pytestmark = pytest.mark.timeout(30)
+
+GAP = 0.1
+TICK = 0.005
+
+
+class Times:
+    """A transport that notes when something is written."""
+
+    def __init__(self, transport):
+        self.times = []
+        self._transport = transport
+        self.name, self.blocks = transport.name, transport.blocks
+        self.read, self.now, self.close = transport.read, transport.now, transport.close
+
+    def write(self, data):
+        self.times.append(self.now())
+        self._transport.write(data)
+
+
+def heard(served):
+    return served.board.firmware.app.session.heard
+
+
+def keepers():
+    return [thread for thread in threading.enumerate() if thread.name == "bubbleskin keep-alive"]
+
+
+@pytest.mark.parametrize("event_loop", [False, True])
+def test_as_virtual_time_passes(event_loop):
+    from bubbleskin.link.session import drive
+    from bubbleskin.sim import SimulatedBoard, SimulatedTransport
+    from bubbleskin.skin import AsyncSkin
+
+    board = SimulatedBoard("wristband7")
+    line = Times(SimulatedTransport(board, "sim"))
+
+    async def script():
+        skin = await AsyncSkin.open(line, 2.0, event_loop=event_loop)
+        await skin.show(np.full(7, 10.0))
+        await skin.sleep(5.0)
+        await skin.show(np.full(7, 11.0), over=2.0)
+        await skin.sleep(0.05)
+
+    if event_loop:
+        asyncio.run(script())
+    else:
+        drive(script())
+    assert len(line.times) > 60
+    assert np.diff(line.times).max() <= GAP + TICK + 1e-9
+    assert board.firmware.app.session.heard >= len(line.times) - 1
+    assert not keepers(), "no thread where time is virtual"
+
+
+def test_while_a_script_thinks(served_port):
+    with bs.connect(served_port.name) as skin:
+        skin.show(np.full(7, 9.0), wait=False)
+        before = heard(served_port)
+        time.sleep(1.5)  # it thinks
+        assert heard(served_port) >= before + 4
+        assert skin.state().target_mm.tolist() == [9.0] * 7
+    before = heard(served_port)
+    time.sleep(0.5)
+    assert heard(served_port) == before, "a skin that is closed lets go"
+
+
+def test_while_an_event_loop_does_something_else(served_port):
+    async def script():
+        async with await bs.aconnect(served_port.name):
+            before = heard(served_port)
+            await asyncio.sleep(1.5)
+            assert heard(served_port) >= before + 4
+
+    asyncio.run(script())
+
+
+def test_a_skin_that_nobody_holds_is_let_go(served_port):
+    skin = bs.connect(served_port.name)
+    assert len(keepers()) == 1
+    keeper = keepers()[0]
+    del skin
+    gc.collect()
+    keeper.join(5.0)
+    assert not keeper.is_alive()
+
+
+def test_every_round_trip_is_told(served_port):
+    with bs.connect(served_port.name) as skin:
+        told = []
+        skin._skin._link.on_ping = lambda *trip: told.append(trip)
+        time.sleep(1.0)
+        assert len(told) >= 3
+        assert all(0 < received_at - sent_at < 1 for sent_at, _, received_at in told)
+        ticks = [reply["ticks"] for _, reply, _ in told]
+        assert ticks == sorted(ticks)
