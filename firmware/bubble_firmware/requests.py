@@ -9,7 +9,6 @@ from bubble_firmware import control
 from bubble_firmware.table import KNOTS_MAX
 from bubble_firmware.ticks import BINS
 from bubble_protocol import messages
-from bubble_protocol.messages import IDLE
 from bubble_protocol.portable import heap_free
 
 _KNOTS_PER_MESSAGE = 48
@@ -51,7 +50,7 @@ class Requests:
         values[4] = self._decoder.good
         values[5] = self._decoder.bad
         values[6] = self._telemetry.dropped
-        if app.mode == IDLE:  # counting takes longer than a tick
+        if not app.safety.drive:  # vented: counting takes longer than a tick
             app.hands.slack()
             self._heap_free = heap_free()
         values[7] = self._heap_free
