@@ -168,6 +168,7 @@ class App:
         self.exceptions += 1
         self.fault(EXCEPTION)
         self.safety.take(safety.FAILED)
+        self.player.cancel()
         self.bubbles.rest()
 
     def _alarm(self, alarms):
@@ -177,11 +178,13 @@ class App:
         if alarms & VENTING:
             self.hands.vent()
             self.self_test.skip()
+            self.player.cancel()
             if self.safety.take(safety.ESTOP if alarms & ESTOP else safety.FAULT):
                 self.bubbles.rest()
 
     def _silence(self, event):
         if self.safety.take(event):
+            self.player.cancel()
             ms = self.safety.silent * (self.board.TICK_US // 1000)
             self.log.add(self.ticks, messages.HOST_SILENT, messages.BOARD, ms)
             if self.safety.mode == HOLDING:

@@ -5,7 +5,8 @@ from array import array
 
 from bubble_protocol.portable import const, micropython, ptr32
 
-_PATIENCE_US = 5000000  # an empty reservoir is full in two seconds
+_PATIENCE_US = 5000000  # at boot: an empty reservoir is full in two seconds
+_DIP_US = 2000000  # later: nineteen bubbles that rise at once take it below what is needed for 0.8 s
 
 _DUTY_PER_PA = const(32)  # full duty of 65535 at 2 kPa below the setpoint
 _HEADROOM_PA = const(500)  # the proportional droop at rest, so that the reservoir stands at its nominal pressure
@@ -24,6 +25,7 @@ _PA_PER_COUNT = const(8)
 _NOMINAL = const(9)
 _MAX = const(10)
 _NEEDED = const(11)
+_FULL = const(12)  # whether there has been as much as is needed
 
 
 @micropython.viper
@@ -44,7 +46,11 @@ def _sense(s: ptr32, count: int) -> int:
         duty = 65535
     s[_PUMP] = duty
     s[_DUMP] = 1 if s[_PRESSURE] > s[_MAX] else 0
-    s[_LOW] = s[_LOW] + 1 if s[_PRESSURE] < s[_NEEDED] else 0
+    if s[_PRESSURE] < s[_NEEDED]:
+        s[_LOW] = s[_LOW] + 1
+    else:
+        s[_LOW] = 0
+        s[_FULL] = 1
     return s[_LOW]
 
 
@@ -57,6 +63,7 @@ class Supply:
         self.dump = 0
         self.lost = False
         self._patience = _PATIENCE_US // board.TICK_US
+        self._dip = _DIP_US // board.TICK_US
         self._state = array("i", (0, 0, 0, 0, 0))
         for number in (
             board.COUNT_LOW,
@@ -66,17 +73,19 @@ class Supply:
             board.SUPPLY_PA,
             board.SUPPLY_MAX_PA,
             board.SUPPLY_LOW_PA,
+            0,
         ):
             self._state.append(number)
 
     def sense(self, count):
         """Take one reading of the supply sensor. A sensor at the end of its range stops the pump."""
         state = self._state
-        self.lost = _sense(state, count) > self._patience
+        self.lost = _sense(state, count) > (self._dip if state[_FULL] else self._patience)
         self.pressure_pa = state[_PRESSURE]
         self.pump = state[_PUMP]
         self.dump = state[_DUMP]
 
     def clear(self):
-        """Wait afresh before the supply is called lost."""
+        """Wait as after boot before the supply is called lost."""
         self._state[_LOW] = 0
+        self._state[_FULL] = 0

@@ -275,7 +275,7 @@ class Sequencer:
 
     def tick(self, ticks=1):
         for _ in range(ticks):
-            self.rig.app.tick()
+            self.rig.tick()
             answer = self.listen()
             assert answer is None
 

@@ -106,7 +106,7 @@ def test_stop_and_vent_overtake(device, urgent, ahead):
         device.send(show(device, 3))  # it waits for 2
     device.send(device.encode(urgent, number))
     device.tick()
-    assert device.app.mode == {"STOP": messages.HOLDING, "VENT": messages.VENTED}[urgent]
+    assert device.app.mode == {"STOP": messages.HOLDING, "VENT": messages.MODE_VENTING}[urgent]
     reply = codec.BY_NAME[urgent].id | messages.REPLY
     assert device.said() == [(1, SHOW_REPLY), (number, reply)]
     skipped = range(2, number)

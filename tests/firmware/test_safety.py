@@ -294,6 +294,6 @@ def test_an_exception_between_two_ticks_vents_too(rig7):
     rig7.hands.broken = {"receive"}
     rig7.app.listen()
     assert rig7.hands.in_vent
-    assert (rig7.app.mode, rig7.app.exceptions) == (messages.VENTED, 1)
+    assert (rig7.app.mode, rig7.app.exceptions) == (messages.MODE_VENTING, 1)
     rig7.hands.broken = set()
     assert rig7.ask("INFO")["exceptions"] == 1

@@ -68,8 +68,7 @@ def encode(parts, loops, n):
 
 
 def info_of(rig):
-    hello = rig.ask("HELLO", (1, 1))
-    return Info.of(hello)
+    return Info.of(rig.open(rig.session))
 
 
 def the_host_takes(data, info, layout):
