@@ -136,7 +136,7 @@ BOARD_FAULTS = (
     (
         SUPPLY_LOST,
         "supply_lost",
-        "the reservoir stays below the pressure that is needed: bubbles are held as well as can be",
+        "the reservoir stays below the pressure that is needed: everything vents",
     ),
     (VALVE_CHIP, "valve_chip", "a valve driver does not answer: everything vents"),
     (SENSOR_CHIP, "sensor_chip", "a converter does not answer: its bubbles vent"),
@@ -149,7 +149,7 @@ BOARD_FAULTS = (
         "a bubble fills though its fill valve is closed and its vent open: everything vents, the reservoir is emptied",
     ),
 )
-VENTING = ESTOP | VALVE_CHIP | OVERFILLED  # while one of these stands, SHOW is refused
+VENTING = ESTOP | SUPPLY_LOST | VALVE_CHIP | OVERFILLED  # while one of these stands, SHOW is refused
 
 # What else is written to the fault log: it forbids nothing. Bits beyond those of the board's faults.
 HOST_SILENT = 256
