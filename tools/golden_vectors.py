@@ -151,7 +151,7 @@ def session() -> str:
     sent.append(wire.encode("PING", 1, (7,), key=key))
     for number, (name, fixed, rows) in enumerate(asked, 1):
         sent += [wire.encode(name, number, fixed, rows, key), b"", b""]
-    sent.append(sent[-6])  # TICKS once more: answered from the replies kept
+    sent.insert(-3, sent[-6])  # TICKS once more, before RESTART: answered from the replies kept
     lines = [{"sent": data.hex(), "received": firmware.tick(counts, data).link.hex()} for data in sent]
     head = {"boot_id": BOOT_ID, "session": SESSION}
     ticks = ",\n".join(json.dumps(line) for line in lines)

@@ -81,6 +81,7 @@ class Content:
             self._app.figures.use(self._figures)
             tables.swap()
             self._app.bubbles.use_tables()
+            self._app.use_settings()
         else:
             self.use_defaults()
         return fits
@@ -91,6 +92,7 @@ class Content:
         self._app.figures.use_nominal()
         self._app.tables.use_nominal()
         self._app.bubbles.use_tables()
+        self._app.use_settings()
 
     def _take_section(self, section, data, at, size):
         """Take one section, as far as this firmware knows it; whether the board allows it."""

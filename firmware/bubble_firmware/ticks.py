@@ -28,5 +28,5 @@ def bins():
 
 def later(ticks, periods):
     """The device time some periods after `ticks`: it goes on from 0 before an integer would become long."""
-    left = LATEST - ticks
-    return ticks + periods if periods <= left else periods - left - 1
+    over = ticks - (LATEST - periods)  # LATEST - ticks would be long before the first tick, when ticks are -1
+    return ticks + periods if over <= 0 else over - 1

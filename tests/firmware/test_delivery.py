@@ -206,9 +206,9 @@ def test_a_reply_that_found_no_room_goes_out_later_in_order_and_before_telemetry
         device.tick()
     device.send(device.encode("VENT", 7))
     device.tick()
-    dropped = device.app.session.telemetry_dropped
+    dropped = device.app.session._telemetry.dropped
     device.tick(5)
-    assert device.app.session.telemetry_dropped == dropped + 1
+    assert device.app.session._telemetry.dropped == dropped + 1
     device.hands.full = False
     device.heard()
     device.tick(5)
