@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 SETTLE = 3.0
 """Seconds beyond `over` after which `show` gives up waiting; the valves need about half of one."""
 
+UNASKED_END = "it was stopped or vented, or its host was silent for too long; see `fault_log()`."
+"""Why a wristband without a fault does no longer what it was asked to."""
+
 _POLL = 0.02
 _CLOCK_AGE = 1.0
 """Seconds after which the clock wants new pings."""
@@ -98,7 +101,7 @@ class AsyncSkin:
                 raise DeviceFault(f"The wristband reports faults ({what}). Mend the cause, then `clear_faults()`.")
             if state.mode != "active":
                 faults = ", ".join((await self.health()).board_faults)
-                why = f"faults of the board: {faults}." if faults else "it was stopped or vented."
+                why = f"faults of the board: {faults}." if faults else UNASKED_END
                 raise DeviceFault(f"The wristband is {state.mode} in the middle of a show: {why}")
             if state.settled:
                 return state

@@ -53,7 +53,7 @@ def test_overtaken_or_applied_and_nothing_after(urgent, seed):
             assert "was not applied" in str(outcome) or "It was not applied" in str(outcome)
             assert height not in applied
     assert {type(outcome) for outcome in outcomes} >= {bs.Overtaken}
-    assert state.mode == {"stop": "holding", "vent": "vented"}[urgent]
+    assert state.mode == {"stop": "holding", "vent": "idle"}[urgent]
     assert applied == sorted(applied)
     assert mode is not None
 

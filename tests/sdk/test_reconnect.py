@@ -56,10 +56,12 @@ class Cable:
             with self._lock:
                 if self._end:
                     next(serve(self.board, self._end))
+                    pause = 0.001
                 else:
                     self.board.tick()
                     self.board.from_device.clear()
-            time.sleep(0.001)
+                    pause = self.board.tick_s
+            time.sleep(pause)
 
     def reset(self):
         with self._lock:
@@ -103,12 +105,28 @@ def test_pulled_and_put_back_between_two_calls(cable):
         assert skin._skin._link._session == session, "the same session goes on"
 
 
+def patient(skin):
+    """Its deadman waits for longer than a cable is out."""
+    skin.configure(deadman_hold=5.0, deadman_vent=5.0)
+
+
 def test_pulled_and_put_back_during_show(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
+        patient(skin)
         thread = soon((0.2, cable.pull), (0.3, cable.push))
         state = skin.show(np.full(7, 10.0), over=1.5)
         assert state.height_mm == pytest.approx(10, abs=0.2)
         thread.join()
+
+
+def test_pulled_during_show_for_longer_than_the_deadman_waits(cable):
+    """What moves is held, and whoever asked is told."""
+    with bs.connect(cable.name, timeout=TIMEOUT) as skin:
+        thread = soon((0.2, cable.pull), (0.5, cable.push))
+        with pytest.raises(bs.DeviceFault, match="holding in the middle of a show.*its host was silent"):
+            skin.show(np.full(7, 10.0), over=1.5)
+        thread.join()
+        assert [fault.name for fault in skin.fault_log()] == ["host_silent"]
 
 
 def test_pulled_and_put_back_during_telemetry_and_an_upload(cable):
@@ -134,7 +152,7 @@ def test_pulled_for_good_raises_in_time(cable):
             skin.show(np.full(7, 10.0))
         assert time.monotonic() - begin < 6.0
         cable.push()
-        assert skin.state().mode == "vented", "and it connects again by itself"
+        assert skin.state().mode == "idle", "and it connects again by itself"
 
 
 def test_a_restart_is_told_and_nothing_is_sent_again(cable):
@@ -147,7 +165,7 @@ def test_a_restart_is_told_and_nothing_is_sent_again(cable):
         thread.join()
         assert skin.info.boot_id != boot
         state = skin.state()
-        assert state.mode == "vented"
+        assert state.mode == "idle"
         assert state.target_mm == pytest.approx(5.0)
 
 
@@ -161,7 +179,7 @@ def test_another_program_takes_the_wristband(cable):
         time.sleep(0.05)
         with pytest.raises(bs.LinkError, match="Another program talks to the wristband"):
             skin.state()
-        assert skin.state().mode == "vented"
+        assert skin.state().mode == "idle"
 
 
 def test_in_asyncio(cable):
@@ -173,6 +191,7 @@ def test_in_asyncio(cable):
                 async for state in skin.telemetry(50):
                     times.append(state.time)
 
+            await skin.configure(deadman_hold=5.0, deadman_vent=5.0)
             watching = asyncio.create_task(watch())
             showing = asyncio.create_task(skin.show(np.full(7, 10.0), over=1.0))
             await asyncio.sleep(0.2)

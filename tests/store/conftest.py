@@ -52,6 +52,9 @@ class Device:
             self.settings = Settings()
         self.store = Store(self, flash)
 
+    def use_settings(self):
+        """They have changed."""
+
     def change(self, number):
         """Make everything in use tell of `number`, so that a mix of two would show."""
         n = self.board.BUBBLES

@@ -40,6 +40,9 @@ class Device:
         self.settings = Settings()
         self.store = Store(self, flash)
 
+    def use_settings(self):
+        pass
+
 
 def change(device, number):
     n = device.board.BUBBLES

@@ -70,6 +70,11 @@ def _file(what: str, loops: int | None) -> Sequence:
     return Sequence(sequence.steps, loops=loops, name=sequence.name, board=sequence.board, layout=sequence.layout)
 
 
+def load(what: str, layout: Layout, loops: int | None) -> Sequence:
+    """The sequence of a file or of the library for `layout`, played `loops` times."""
+    return _library(what, layout, loops) if what in LIBRARY else _file(what, loops)
+
+
 def _library(what: str, layout: Layout, loops: int | None) -> Sequence:
     return LIBRARY[what](layout) if loops is None else LIBRARY[what](layout, loops=loops)
 

@@ -6,8 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import click
+from rich.console import Console
+from rich.progress import Progress
 
 from bubbleskin.cli.membrane import DATA, balloon, draw_fit, fit_file, fit_options, material_options, picture_option
+from bubbleskin.cli.play import load
+from bubbleskin.connect import connect
+from bubbleskin.shape.sequences import LIBRARY
 
 
 @click.group()
@@ -82,6 +87,28 @@ def plot_order(output: Path) -> None:
 
     membrane.save(contact.plot_order(), output)
     click.echo(f"wrote {output} (the model's heights)", err=True)
+
+
+@plot.command("sequence")
+@click.argument("what", metavar=f"FILE|{'|'.join(LIBRARY)}")
+@click.option("--board", type=click.Choice(["wristband7", "wristband19"]), default="wristband7", show_default=True)
+@click.option("--loops", type=int, help="How often to play it all. Default: as the sequence says.")
+@click.option("--rate", type=click.IntRange(1, 50), default=15, show_default=True, help="Pictures a second.")
+@click.option("--seconds", type=float, default=30.0, show_default=True, help="At most so much of it.")
+@click.option("-o", "--output", type=DATA, default="sequence.gif", show_default=True, help=".gif, or .mp4 with ffmpeg.")
+def plot_sequence(what: str, board: str, loops: int | None, rate: int, seconds: float, output: Path) -> None:
+    """A film of a sequence: the true shapes of a simulated wristband that plays it, from above and from the side."""
+    from bubbleskin.plot import sequence as film
+
+    with connect(f"sim://{board}") as skin, Progress(console=Console(stderr=True), transient=True) as bar:
+        sequence = load(what, skin.layout, loops)
+        bar.add_task("playing …", total=None)
+        frames = film.watch(skin, sequence, rate=rate, seconds=seconds)
+        task = bar.add_task("drawing …", total=len(frames))
+        film.animate(
+            skin.layout, frames, output, title=sequence.name, progress=lambda done: bar.update(task, completed=done)
+        )
+    click.echo(f"wrote {output} ({len(frames)} pictures of a simulated {board})", err=True)
 
 
 commands = [plot]

@@ -18,6 +18,8 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.plot.contact import colours, draw_above, draw_side
 from bubbleskin.plot.membrane import STYLE
+from bubbleskin.shape.sequence import Sequence as BubbleSequence
+from bubbleskin.skin import Skin
 
 _DPI = 80
 
@@ -33,6 +35,27 @@ class Frame(NamedTuple):
     radius: NDArray[np.float64]
     """m, (n,)."""
     contacts: tuple[()] = ()
+
+
+def watch(skin: Skin, sequence: BubbleSequence, *, rate: int = 15, seconds: float = 30.0) -> list[Frame]:
+    """Play `sequence` on the simulated wristband behind `skin`; its true shapes, `rate` times a second, to its end.
+
+    At most `seconds` of it. Raises `InvalidInput` where there is no simulated wristband.
+    """
+    board = skin.simulated
+    if board is None:
+        raise InvalidInput("A film needs a simulated wristband: nobody sees the true shape of a real one.")
+    skin.play(sequence, wait=False)
+    begin = board.time
+    frames = []
+    while board.time - begin < seconds:
+        plant = board.plant
+        radius = plant.parameters.radius * plant.stretch
+        frames.append(Frame(board.time - begin, plant.height_mm, plant.position_m, radius))
+        skin.sleep(1 / rate)
+        if skin.playing().state == "ended":
+            break
+    return frames
 
 
 def animate(
@@ -54,7 +77,7 @@ def animate(
         raise InvalidInput(f"{path} ends in {path.suffix or 'nothing'}; a film is a .gif or an .mp4.")
     if path.suffix == ".mp4" and not shutil.which("ffmpeg"):
         raise InvalidInput("An .mp4 needs the program ffmpeg, which is not here. Install it, or write a .gif.")
-    rate = round(1 / (frames[1].time - frames[0].time))
+    rate = round((len(frames) - 1) / (frames[-1].time - frames[0].time))
     writer = FFMpegWriter(fps=rate) if path.suffix == ".mp4" else PillowWriter(fps=rate)
     with rc_context(STYLE):
         figure = Figure(figsize=(4.2, 6.0), layout="constrained")

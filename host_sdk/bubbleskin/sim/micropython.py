@@ -16,7 +16,7 @@ from bubbleskin.errors import LinkError
 from bubbleskin.interpreter import find_micropython
 from bubbleskin.sim.board import Outputs
 
-HEAP = "320k"
+HEAP = "448k"
 """Less than on a Pico, which has 237 kB for the firmware's data: here its code, 95 kB, is in the heap too, there in flash,
 and so are the 16 kB that stand for its flash."""
 
