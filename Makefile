@@ -4,13 +4,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-GENERATORS := nominal_table golden_vectors protocol_page cli_page draw_demo draw_membrane_figures
+GENERATORS := nominal_table golden_vectors protocol_page cli_page state_page draw_demo draw_membrane_figures draw_contact_figures
+EMULATED := --target rp2040://wristband7?contact=0 --target rp2040://wristband19?contact=0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip check lint generated micropython bench day soak fuzz generate clean
+.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz generate clean
 
 help: ## what can be made
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 setup: $(READY) ## the virtual environment .venv with the bubbleskin command
 
@@ -28,9 +29,14 @@ demo: setup ## a simulated wristband takes two shapes; ends with a picture
 test: setup lint generated micropython ## every check that needs no hardware
 	$(BIN)/python -m pytest -n 2 -m "not chip"
 
-chip: setup micropython ## build the RP2040's firmware and run it on an emulated chip, ten minutes
+chip: setup micropython ## build the RP2040's firmware, run its tests and hil_tests on an emulated chip, 20 minutes
 	$(BIN)/bubbleskin firmware build
-	$(BIN)/python -m pytest -n 2 -m chip
+	$(BIN)/python -m pytest -n 2 -m "chip and not long"
+	$(BIN)/python -m pytest -n 2 --timeout 600 hil_tests $(EMULATED)
+
+chip-long: setup micropython ## what takes longer on an emulated chip
+	$(BIN)/bubbleskin firmware build
+	$(BIN)/python -m pytest -n 2 -m "chip and long"
 
 check: setup lint ## the everyday checks, under a minute
 	$(BIN)/python -m pytest -n 2 -m "not slow and not chip"
