@@ -137,12 +137,12 @@ class App:
         if self.player.running:
             self.player.tick()
         bubbles.step(counts, supply.pressure_pa, self.safety.drive)
+        self.guard.spare(supply.pressure_pa)
         found = self.guard.check()
         self._moving = found & guard.MOVES
         self.safety.settle(found & guard.PRESSED)
         if found & (guard.NEW | guard.OVERFILLED):
             self._found(found)
-        self.guard.spare(supply.pressure_pa)
         if self.safety.mode == messages.BOOT:
             self._test()
         if self.faults & OVERFILLED:  # nothing more into it

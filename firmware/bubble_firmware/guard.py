@@ -4,7 +4,7 @@
 `check` runs in every tick after `control.step`, on the same rows, and sets the fault bits that make control isolate a
 bubble from the next tick on. What it goes by, with thresholds and measured times, is in docs/safety.md:
 
-- the *book of air*: `estimate` adds what the valves have brought and then moves the sum to what the sensor says. What
+- the *book of air*: control adds what the valves have brought and then moves the sum to what the sensor says. What
   is taken away in this way is air that is missing, what is added is surplus. Two leaky buckets collect them.
 - a *closed* line must keep its pressure, an open valve must show the tube's loss of pressure, a bubble that is *fed*
   must get some, and a *vented* one must lose it.
@@ -73,7 +73,14 @@ SEEN = const(18)  # faults that are in the log
 GIVEN = const(19)  # µJ that have come in for sure since the last measurement
 TAKEN = const(20)  # µJ let out while there is surplus
 EMPTIED = const(21)  # whether the pressure has dropped as no valve makes it drop
-GUARD = const(22)
+# What control had decided before this tick, which is what the pressure of this tick tells of.
+WAS_STATUS = const(22)
+WAS_DOSE = const(23)
+WAS_BUSY = const(24)
+WAS_FLOW = const(25)
+WAS_FILL = const(26)
+WAS_VENT = const(27)
+GUARD = const(28)
 
 # The board's numbers for it.
 ALLOWED = const(0)  # µJ in a tick that may get lost
@@ -152,7 +159,7 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
             else:
                 faults |= BUDGET
 
-        if s[STATUS] == RESTING or s[STATUS] == FAULT:
+        if g[WAS_STATUS] == RESTING or g[WAS_STATUS] == FAULT:
             # Vented: the pressure falls, or is gone.
             g[MISSING] = 0
             g[SURPLUS] = 0
@@ -181,20 +188,20 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                         said |= _OVERFILLED
         else:
             said |= _PRESSED
-            if s[STATUS] == MOVING:
+            if g[WAS_STATUS] == MOVING:
                 said |= _MOVES
             g[FELL_PA] = p
             g[FELL] = 0
             if s[LOST] == 0:
-                quiet = 1 if s[BUSY] <= 0 else 0
+                quiet = 1 if g[WAS_BUSY] <= 0 else 0
                 # For sure: dead times differ, so a valve may be open for less than is known.
-                on = s[FILL_US]
+                on = g[WAS_FILL]
                 if on and (on < tick or g[RUN] == 0):
                     on -= s[OPENS_US] - s[CLOSES_US] + UNSURE_US
-                fed = s[FLOW] * on // 16000 if on > 0 else 0
+                fed = g[WAS_FLOW] * on // 16000 if on > 0 else 0
 
                 # The book of air. Missing is at most what has come in for sure: the rest is bad metering.
-                found = air - g[WAS_AIR] - s[DOSE]
+                found = air - g[WAS_AIR] - g[WAS_DOSE]
                 lost = 0 - found
                 if lost > 0:
                     if lost > g[GIVEN]:
@@ -209,8 +216,8 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                 if more <= 0:
                     more = 0
                     g[TAKEN] = 0
-                elif s[DOSE] < 0:
-                    g[TAKEN] = g[TAKEN] - s[DOSE]
+                elif g[WAS_DOSE] < 0:
+                    g[TAKEN] = g[TAKEN] - g[WAS_DOSE]
                 g[SURPLUS] = more
                 if lost > MISSING_MAX:
                     faults |= LEAK
@@ -237,14 +244,14 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                     g[LOW_PA] = p
                 if quiet or p > g[HIGH_PA]:
                     g[HIGH_PA] = p
-                if s[FILL_US] == tick or s[VENT_US] == tick:
+                if g[WAS_FILL] == tick or g[WAS_VENT] == tick:
                     g[RUN] = g[RUN] + 1
                     if g[RUN] > w[FLOWS]:
-                        sign = p - g[LOW_PA] if s[FILL_US] else g[HIGH_PA] - p
-                        if sign < (k[TUBE] * s[FLOW] >> 4) // 3:
+                        sign = p - g[LOW_PA] if g[WAS_FILL] else g[HIGH_PA] - p
+                        if sign < (k[TUBE] * g[WAS_FLOW] >> 4) // 3:
                             g[DRY] = g[DRY] + 1
                             if g[DRY] >= w[DRY_MAX]:
-                                faults |= NO_AIR if s[FILL_US] else VALVE_STUCK
+                                faults |= NO_AIR if g[WAS_FILL] else VALVE_STUCK
                         else:
                             g[DRY] = 0
                 else:
@@ -252,7 +259,7 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                     g[DRY] = 0
 
                 # Closed: the pressure stays.
-                if quiet == 0 or s[DOSE] != 0:
+                if quiet == 0 or g[WAS_DOSE] != 0:
                     g[SINCE] = SETTLE
                 else:
                     if g[SINCE] <= 0 or g[SINCE] >= w[WINDOW]:
@@ -273,6 +280,12 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                     else:
                         g[WRONG] = 0
         g[WAS_AIR] = air
+        g[WAS_STATUS] = s[STATUS]
+        g[WAS_DOSE] = s[DOSE]
+        g[WAS_BUSY] = s[BUSY]
+        g[WAS_FLOW] = s[FLOW]
+        g[WAS_FILL] = s[FILL_US]
+        g[WAS_VENT] = s[VENT_US]
         if faults:
             s[FAULTS] = faults
             s[CALM] = 0  # control is to look at it in the next tick

@@ -41,7 +41,7 @@ class Hands:
         self.line = line[size:]
         return size
     def send(self, frame, length):
-        if frame[1] != 0x07:
+        if frame[1] not in (0x07, 0x1C, 0x26):  # TELEMETRY, TELEMETRY_FIELDS, SEQUENCE_EVENT
             self.answers += 1
         return True
     def alive(self, mode, faults):

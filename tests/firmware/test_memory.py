@@ -160,7 +160,7 @@ SEQUENCES = [
     pytest.param(
         ("SHOW up", "FAULTS_READ", "SETTING_READ", "SETTING_WRITE", "no setting", "FAULTS_ACK", "VENT"), id="safety"
     ),
-    pytest.param(("SHOW up", "PING", "long silence", "STATE"), id="deadman"),
+    pytest.param(("SETTING_WRITE", "SHOW up", "PING", "long silence", "STATE"), id="deadman"),
 ]
 SESSIONS = 17
 """One more than the device remembers: the first may come again after the last."""
@@ -199,7 +199,7 @@ def request(name, n, number, session):
         "FAULTS_ACK": lambda: of("FAULTS_ACK", (3,)),
         "SETTING_WRITE": lambda: of("SETTING_WRITE", (), [(0, 100), (1, 200)]),
         "no setting": lambda: of("SETTING_WRITE", (), [(9, 100)]),
-        "long silence": lambda: bytes(17 * 250),
+        "long silence": lambda: bytes(9 * 100),  # ticks; longer than SETTING_WRITE allows
     }
     requests |= {
         "SEQUENCE_BEGIN": lambda: of("SEQUENCE_BEGIN", (3, n, 0, 5, program_crc(n))),

@@ -17,8 +17,8 @@ from bubbleskin.interpreter import find_micropython
 from bubbleskin.sim.board import Outputs
 
 HEAP = "448k"
-"""Less than on a Pico, which has 237 kB for the firmware's data: here its code, 95 kB, is in the heap too, there in flash,
-and so are the 16 kB that stand for its flash."""
+"""What the firmware needs here: 116 kB of data (19 bubbles), as on the Pico, which has 237 kB for them. In this heap
+are also the firmware's code, 139 kB, and 17 kB that stand for flash; and compiling the code takes room and leaves holes."""
 
 _PATIENCE = 10.0  # wall seconds for one tick, which takes well under a millisecond
 
