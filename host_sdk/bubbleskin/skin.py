@@ -132,6 +132,8 @@ class AsyncSkin:
         if into not in numbers:
             raise InvalidInput(f"A wristband cannot restart into {into!r}; choose one of {', '.join(numbers)}.")
         await self._link.call("RESTART", (numbers[into],))
+        self._link.restart_asked = True
+        self._link.open = False  # the next call opens a session with the new boot
 
     def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> AsyncGenerator[State]:
         """See `Skin.telemetry`."""

@@ -61,6 +61,8 @@ class Link:
         self._heard = False
         self._session = 0
         self._boot_id: int | None = None
+        self.restart_asked = False
+        """A restart that was asked for is not told as one that was not."""
         self._hellos: dict[int, float] = {}  # when those were sent that asked for this session, by number
         self._hello = 0
         self._greeting: wire.Received | None = None
@@ -220,7 +222,8 @@ class Link:
 
     def _begin(self, reply: wire.Received) -> None:
         if self._boot_id not in (None, reply["boot_id"]):
-            self._window.end(lambda request: sentences.restarted(request, self.transport.name), waiting=True)
+            asked, self.restart_asked = self.restart_asked, False
+            self._window.end(lambda request: sentences.restarted(request, self.transport.name), waiting=not asked)
         self._boot_id = reply["boot_id"]
         key = wire.session_key(reply["boot_id"], self._session)
         self._window.begin(key, max(1, reply["window"]))
