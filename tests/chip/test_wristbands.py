@@ -16,7 +16,7 @@ def test_a_dome_settles_through_the_chips(emulated, name):
     skin = emulated(name)
     board = skin.simulated
     assert skin.info.board == name
-    assert board.time < 0.5  # HELLO has been answered
+    assert board.time < 1.0  # HELLO has been answered
     assert board.chip.resets == 0
     skin.show(DOME[name])
     assert np.abs(board.height_mm - DOME[name]).max() < 0.2
