@@ -79,6 +79,7 @@ class AsyncSkin:
     def _opened(self, reply: Received) -> None:
         """A new session: the device may have restarted, with other tables or firmware."""
         self.info = Info.of(reply)
+        self._telemetry.opened()
 
     async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
         """See `Skin.show`."""

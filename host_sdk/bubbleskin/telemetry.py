@@ -23,6 +23,13 @@ class Telemetry:
         self._info = info
         self._iterator = 0  # number of the newest
         self._recording: Recording | None = None
+        self._wanted: tuple[str, tuple[int, ...]] | None = None  # what is subscribed to
+
+    def opened(self) -> None:
+        """The link has opened another session, in which the device knows of no subscription: it goes on."""
+        if self._wanted:
+            self._link.telemetry.go_on()
+            self._link.post(*self._wanted)
 
     async def states(self, rate_hz: float, fields: Iterable[str] | None) -> AsyncGenerator[State]:
         """See `Skin.telemetry`."""
@@ -43,7 +50,7 @@ class Telemetry:
         except (GeneratorExit, asyncio.CancelledError):
             if mine == self._iterator:
                 with contextlib.suppress(LinkError):
-                    await link.call("SUBSCRIBE", (0,))
+                    await self._unsubscribe()
             raise
 
     async def record(
@@ -85,7 +92,7 @@ class Telemetry:
     async def _unrecord(self) -> None:
         self._recording = None
         self._link.telemetry.listeners.remove(self._to_recording)
-        await self._link.call("SUBSCRIBE", (0,))
+        await self._unsubscribe()
 
     def _subscription(self, rate_hz: float, fields: Iterable[str] | None) -> tuple[tuple[str, tuple[int, ...]], int]:
         """The request for telemetry, and its period in ticks."""
@@ -102,9 +109,14 @@ class Telemetry:
         return ("SUBSCRIBE_FIELDS", (period, columns.mask(fields, self._info.bubbles))), period
 
     async def _subscribe(self, request: str, values: tuple[int, ...]) -> None:
-        await self._link.call("SUBSCRIBE", (0,))  # so that nothing of an older one is still on its way
+        await self._unsubscribe()  # so that nothing of an older one is still on its way
         self._link.telemetry.begin()
         await self._link.call(request, values)
+        self._wanted = request, values
+
+    async def _unsubscribe(self) -> None:
+        self._wanted = None
+        await self._link.call("SUBSCRIBE", (0,))
 
     def _state_of(self, message: Received, lost: int) -> State:
         if message.id == messages.TELEMETRY:

@@ -169,6 +169,20 @@ def test_a_restart_is_told_and_nothing_is_sent_again(cable):
         assert state.target_mm == pytest.approx(5.0)
 
 
+def test_telemetry_goes_on_after_a_restart(cable, tmp_path):
+    """Whoever calls next is told of the restart; what is recorded goes on by itself."""
+    with bs.connect(cable.name, timeout=TIMEOUT) as skin, skin.record(tmp_path / "x.csv", 50) as recording:
+        skin.sleep(0.2)
+        cable.reset()
+        with pytest.raises(bs.DeviceRestarted):
+            skin.state()
+        before = recording.rows
+        assert before
+        skin.sleep(0.4)
+        assert recording.rows > before + 10
+        assert recording.lost < 20
+
+
 def test_another_program_takes_the_wristband(cable):
     """On a line that two can write to: the first is told so, and takes it back with its next call."""
     from bubbleskin.link.wire import encode

@@ -31,6 +31,10 @@ class Inbox(deque[Received]):
         self.lost = 0
         self._sequence = 0
 
+    def go_on(self) -> None:
+        """The same subscription anew, in another session: sequence numbers begin at 1, and what has come stays."""
+        self._sequence = 0
+
     def append(self, message: Received) -> None:
         """Take one message."""
         gap = (message.sequence - self._sequence - 1) & 0xFFFF

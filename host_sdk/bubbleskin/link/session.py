@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 import secrets
 import struct
 import threading
@@ -122,6 +123,10 @@ class Link:
                     if not request.done:
                         self._window.withdraw(request)
             return [self._outcome(request) for request in requests]
+
+    def post(self, name: str, fixed: Sequence[int]) -> None:
+        """Send a request that nobody waits for; it ends with the session."""
+        self._window.submit(Request(name, fixed, (), math.inf, self.timeout))
 
     async def wait(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
         """Take what comes until `done()` or the transport's clock stands at `until`; keep the link alive meanwhile."""
