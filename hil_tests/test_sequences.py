@@ -41,6 +41,7 @@ def test_steps_begin_within_a_tick_of_their_schedule(skin):
     check_schedule(skin, skin.play(sequence), sequence)
 
 
+@pytest.mark.long
 def test_a_start_at_a_device_time(skin):
     at = skin.state().time + 0.3
     sequence = bs.Sequence([bs.Step(shape(skin, 6.0), 0.1)])
@@ -58,6 +59,7 @@ def test_a_start_at_a_device_time(skin):
         skin.play(sequence, at=math.nan)
 
 
+@pytest.mark.long
 def test_the_device_follows_the_ramp(skin):
     """The setpoint is what `targets_at` says, at the firmware's own time."""
     sequence = bs.Sequence([bs.Step(shape(skin, 12.0), 0.6, "smooth", bs.After(0.3))])
@@ -84,6 +86,7 @@ def test_a_condition_that_never_comes_ends_by_its_timeout(skin):
     assert skin.state().mode == "active"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("then", "modes"), [("vent", ("venting", "idle")), ("stop", ("holding",))])
 def test_what_follows_a_timeout(skin, then, modes):
     step = bs.Step(shape(skin, 12.5), until=bs.Settled(0.05, 0.02, then))
@@ -92,6 +95,7 @@ def test_what_follows_a_timeout(skin, then, modes):
     assert skin.state().mode in modes
 
 
+@pytest.mark.long
 def test_after_a_timeout_it_goes_on_and_says_which(skin):
     steps = [bs.Step(shape(skin, 12.5), until=bs.Settled(0.05, 0.02, "go on")), bs.Step(shape(skin, 6.0), 0.1)]
     played = skin.play(bs.Sequence(steps))
@@ -101,6 +105,7 @@ def test_after_a_timeout_it_goes_on_and_says_which(skin):
     assert played.began[1] - played.began[0] == pytest.approx(0.02, abs=2 * skin.info.tick)
 
 
+@pytest.mark.long
 def test_a_condition_that_comes(skin):
     played = skin.play(bs.Sequence([bs.Step(shape(skin, 10.0), 0.1, until=bs.Settled(0.2, 5.0, "vent"))]))
     assert played.timeouts == ()
@@ -108,6 +113,7 @@ def test_a_condition_that_comes(skin):
     assert np.abs(skin.state().height_mm - 10.0).max() <= 0.2
 
 
+@pytest.mark.long
 def test_pause_and_resume(skin):
     sequence = bs.Sequence([bs.Step(shape(skin, 12.0), 0.6), bs.Step(None, until=bs.After(0.1))])
     skin.play(sequence, wait=False)
@@ -127,6 +133,7 @@ def test_pause_and_resume(skin):
     assert np.abs(skin.state().height_mm - 12.0).max() <= 0.2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", ["show", "stop", "vent"])
 def test_what_ends_a_sequence(skin, end):
     skin.play(bs.Sequence([bs.Step(shape(skin, 9.0), 0.05), bs.Step(shape(skin, 6.0), 0.05)], loops=0), wait=False)
@@ -143,6 +150,7 @@ def test_what_ends_a_sequence(skin, end):
         skin.pause()
 
 
+@pytest.mark.long
 def test_another_sequence_takes_over(skin):
     skin.play(bs.Sequence([bs.Step(shape(skin, 12.0), 0.2)], loops=0), wait=False)
     skin.sleep(0.1)
@@ -151,6 +159,7 @@ def test_another_sequence_takes_over(skin):
     assert played.timeouts == ()
 
 
+@pytest.mark.long
 def test_progress_is_told(skin):
     told = []
     sequence = bs.Sequence([bs.Step(shape(skin, 6.0), 0.05, name="up"), bs.Step(shape(skin, 7.0), 0.05)], loops=2)
@@ -183,6 +192,7 @@ OTHERS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("other", OTHERS)
 def test_what_this_device_cannot_play_is_refused_before_a_byte_is_sent(skin, other):
     make, sentence = OTHERS[other]
@@ -200,6 +210,7 @@ def choreography(skin, seconds, each=0.1):
     return bs.Sequence([bs.Step(rng.uniform(5.5, 9.5, n).round(3), each) for _ in range(count)])
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_sixty_seconds_fit_the_memory(skin):
     sequence = choreography(skin, 60)
@@ -212,6 +223,7 @@ def test_sixty_seconds_fit_the_memory(skin):
     assert playing.begun == pytest.approx(playing.begun, abs=skin.info.tick)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_longer_one_streams_without_a_gap(skin):
     sequence = choreography(skin, 60, 0.02)

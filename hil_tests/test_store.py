@@ -23,6 +23,7 @@ def restart(skin):
     skin.sleep(2.0)  # a chip takes a while to appear on USB again
 
 
+@pytest.mark.long
 def test_saved_tables_are_in_use_after_a_restart(stored):
     skin = stored
     before = skin.stored()
@@ -39,6 +40,7 @@ def test_saved_tables_are_in_use_after_a_restart(stored):
     assert skin.health().exceptions == 0
 
 
+@pytest.mark.long
 def test_a_shape_is_held_as_before(stored):
     skin = stored
     skin.save()
@@ -47,6 +49,7 @@ def test_a_shape_is_held_as_before(stored):
     assert abs(state.height_mm - 6.0).max() < 0.2
 
 
+@pytest.mark.long
 def test_saving_is_refused_while_a_shape_is_held(stored):
     skin = stored
     skin.show([6.0] * skin.info.bubbles)
