@@ -44,7 +44,12 @@ def test_a_running_firmware_is_asked_for_the_boot_loader(computer, bring, file, 
     assert computer.flash.startswith(images.new.data)
 
 
-@pytest.mark.parametrize("cut", range(1, BLOCKS))
+EVERYDAY = (1, 2, BLOCKS // 2, BLOCKS - 1)
+
+
+@pytest.mark.parametrize(
+    "cut", [pytest.param(cut, marks=() if cut in EVERYDAY else pytest.mark.slow) for cut in range(1, BLOCKS)]
+)
 def test_power_lost_after_any_block_is_repaired_by_the_next_flash(computer, bring, cut, images):
     computer.plug_in(bootsel=True)
     computer.cut_after = cut

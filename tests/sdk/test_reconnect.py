@@ -123,7 +123,7 @@ def test_pulled_during_show_for_longer_than_the_deadman_waits(cable):
     """What moves is held, and whoever asked is told."""
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
         thread = soon((0.2, cable.pull), (0.5, cable.push))
-        with pytest.raises(bs.DeviceFault, match="holding in the middle of a show.*its host was silent"):
+        with pytest.raises(bs.DeviceFault, match=r"holding in the middle of a show.*its host was silent"):
             skin.show(np.full(7, 10.0), over=1.5)
         thread.join()
         assert [fault.name for fault in skin.fault_log()] == ["host_silent"]

@@ -20,7 +20,11 @@ _PINGED = 1.0
 
 @click.command()
 @click.option("--rate", type=float, default=20.0, show_default=True, help="Times a second.")
-@click.option("--seconds", type=float, help="End after so many seconds of device time; without it, at Ctrl-C.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    help="End after so many seconds of device time; without it, at Ctrl-C.",
+)
 @click.option(
     "--record",
     "path",

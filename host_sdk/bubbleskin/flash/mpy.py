@@ -25,7 +25,9 @@ pico({board!r})
 def files(board: str) -> dict[str, bytes]:
     """Every file of the firmware of `board` by its path in a slot, `LAST` at the end."""
     sources = {
-        name.split("/", 1)[1]: content for name, content in device_files().items() if not name.endswith("manifest.py")
+        name.split("/", 1)[1]: content
+        for name, content in device_files().items()
+        if name.endswith(".py") and not name.endswith("manifest.py")
     }
     sources[LAST.replace(".mpy", ".py")] = _START.format(board=board).encode()
     compiled = {}

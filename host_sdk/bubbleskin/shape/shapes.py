@@ -51,4 +51,4 @@ def load(path: Path) -> NDArray[np.float64]:
     except OSError as error:
         raise InvalidInput(f"Cannot read {path}: {error.strerror or error}.") from None
     except ValueError as error:
-        raise InvalidInput(f"{path} is not a heightfield of numbers: {error}.") from None
+        raise InvalidInput(f"{path} is not a heightfield of numbers: {str(error).rstrip('.')}.") from None
