@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from bubble_protocol import messages
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.link.session import Link
+from bubbleskin.link.session import Call, Link
 from bubbleskin.link.wire import Received, crc32
 from bubbleskin.records import Health, Info, State
 from bubbleskin.shape.program import Program
@@ -19,6 +19,7 @@ from bubbleskin.shape.sequence import Playable, Settled, playable
 _STATES = {number: name for number, name, _ in messages.SEQUENCE_STATES}
 _REASONS = {number: name for number, name, _ in messages.SEQUENCE_REASONS}
 _WORDS_PER_MESSAGE = 121
+_TOGETHER = 8  # messages on their way at once: each has as long as any other call
 _POLL = 0.2
 """Seconds after which the device is asked, news or not: it must hear from its host, and an event can be lost."""
 _NAMED = 3  # heights in a sentence
@@ -268,13 +269,20 @@ class _Feed:
         if not self._free:
             self._free = (await self._link.call("SEQUENCE_STATE"))["free"]
         while self._free:
-            part = list(itertools.islice(self._order, min(self._most, self._free)))
-            if not part:
+            calls: list[Call] = []
+            sent: list[int] = []
+            while len(calls) < _TOGETHER:
+                part = list(itertools.islice(self._order, min(self._most, self._free - len(sent))))
+                if not part:
+                    break
+                words = self.program.records[part].reshape(-1, 1).tolist()
+                calls.append(("SEQUENCE_WRITE", (self.id, len(self._sent) + len(sent) & 0xFFFF), words))
+                sent += part
+            if not calls:
                 break
-            words = self.program.records[part].reshape(-1, 1).tolist()
-            reply = await self._link.call("SEQUENCE_WRITE", (self.id, len(self._sent) & 0xFFFF), words)
-            self._sent += part
-            self._free = reply["free"]
+            replies = await self._link.calls(calls)
+            self._sent += sent
+            self._free = replies[-1]["free"]
         self.unsent = self.total == 0 or len(self._sent) < self.total
 
 

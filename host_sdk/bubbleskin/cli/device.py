@@ -116,6 +116,13 @@ def info(device: str | None, json: bool) -> None:
     "--file", "path", type=click.Path(dir_okay=False, path_type=Path), help="A heightfield: .npy, or numbers in .csv."
 )
 @click.option("--over", type=float, default=0.0, show_default=True, help="Seconds the change should take.")
+@click.option(
+    "--hold",
+    type=click.FloatRange(min=0),
+    default=0.0,
+    show_default=True,
+    help="Seconds to hold it for; a wristband vents 1 s after its host has gone.",
+)
 @device
 @as_json
 def show(
@@ -124,6 +131,7 @@ def show(
     shape: str | None,
     path: Path | None,
     over: float,
+    hold: float,
     device: str | None,
     json: bool,
 ) -> None:
@@ -148,6 +156,7 @@ def show(
             click.echo(jsonlib.dumps({name: column.tolist() for name, column in columns.items()}))
         else:
             Console().print(_reached(state, skin, f"settled at {state.time:.2f} s"))
+        skin.sleep(hold)
 
 
 commands = [demo, info, show]
