@@ -79,3 +79,10 @@ def test_a_contact_for_another_number_of_bubbles_is_refused():
 
     with pytest.raises(bs.InvalidInput, match="7 bubbles, the plant has 3"):
         Plant(PlantParameters.nominal(3), contact=bs.CompliantContact(bs.Layout.hexagon(1)))
+
+
+@pytest.mark.parametrize(("make", "height"), [(bs.sequences.pop_up, 14.0), (bs.sequences.flat_twin, 12.0)])
+def test_the_same_targets_in_two_orders_as_sequences_that_the_device_plays(make, height):
+    with bs.connect("sim://wristband7?seed=1") as skin:
+        skin.play(make(skin.layout, high_mm=TALL))
+        assert skin.simulated.height_mm[0] == pytest.approx(height, abs=0.2 if height > TALL else 0.4)
