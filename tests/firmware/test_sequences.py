@@ -76,7 +76,9 @@ def test_a_start_at_a_tick(sequencer):
 def test_a_start_that_has_passed_is_refused(sequencer):
     sequencer.load(sequencer.all(9000, ramp=1000))
     now = sequencer.rig.app.ticks
-    assert sequencer.refusal("SEQUENCE_START", 7, now) == (messages.TOO_LATE, 1, WHOLE, now, now + 2, 0), "it is heard in the next tick"
+    assert sequencer.refusal("SEQUENCE_START", 7, now) == (messages.TOO_LATE, 1, WHOLE, now, now + 2, 0), (
+        "it is heard in the next tick"
+    )
     assert sequencer.refusal("SEQUENCE_START", 7, 1)[0] == messages.TOO_LATE
     assert sequencer.state()["state"] == messages.ARMED
     soon = sequencer.rig.app.ticks + 2
