@@ -30,12 +30,13 @@ def tool(name):
 soak = tool("soak")
 
 
-def test_ten_thousand_commands_over_a_line_that_fails():
-    result = soak.soak(10_000, seed=3)
+@pytest.mark.parametrize("commands", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_thousands_of_commands_over_a_line_that_fails(commands):
+    result = soak.soak(commands, seed=3)
     assert result.problems == []
-    assert len(result.journals) > 3
-    assert result.told.count(soak.APPLIED) > 9000
-    assert min(count for fault, count in result.faults.items() if fault != "stall") > 10
+    assert len(result.journals) > commands // 3000
+    assert result.told.count(soak.APPLIED) > 0.9 * commands
+    assert min(count for fault, count in result.faults.items() if fault != "stall") > commands // 1000
 
 
 def test_a_device_that_forgets_replies_would_be_found_out(monkeypatch):
@@ -136,7 +137,7 @@ class ExactlyOnce(RuleBasedStateMachine):
 
 
 TestExactlyOnce = ExactlyOnce.TestCase
-TestExactlyOnce.settings = settings(max_examples=25, stateful_step_count=25, deadline=None)
+TestExactlyOnce.settings = settings(max_examples=8, stateful_step_count=25, deadline=None)
 
 
 @pytest.mark.slow
