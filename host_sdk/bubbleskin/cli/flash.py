@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bubbleskin.build.rp2040 import BOARDS
 from bubbleskin.cli.options import as_json
+from bubbleskin.errors import InvalidInput
 
 
 @click.command()
@@ -45,6 +46,8 @@ def flash(
     from bubbleskin.flash import Order, ThisMachine
     from bubbleskin.flash import flash as bring
 
+    if device and device.startswith(("sim://", "micropython://")):
+        raise InvalidInput(f"{device} is simulated: it always runs the firmware of this source. Name a wristband's port.")
     console = Console(stderr=json)
     columns = (
         TextColumn("{task.description}"),
