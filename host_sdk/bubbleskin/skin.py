@@ -348,7 +348,10 @@ class Skin:
         return drive(self._skin.tick_histogram())
 
     def restart(self, into: str = "firmware") -> None:
-        """Vent and start again, into the `firmware`, the `boot_loader` or MicroPython's `prompt`; then connect anew."""
+        """Vent and start again, into the `firmware`, the `boot_loader` or MicroPython's `prompt`.
+
+        Into the firmware, the next call finds the wristband again by itself; `DeviceRestarted` is for restarts nobody asked for.
+        """
         drive(self._skin.restart(into))
 
     def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> Iterator[State]:

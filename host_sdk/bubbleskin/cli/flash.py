@@ -47,7 +47,9 @@ def flash(
     from bubbleskin.flash import flash as bring
 
     if device and device.startswith(("sim://", "micropython://")):
-        raise InvalidInput(f"{device} is simulated: it always runs the firmware of this source. Name a wristband's port.")
+        raise InvalidInput(
+            f"{device} is simulated: it always runs the firmware of this source. Name a wristband's port."
+        )
     console = Console(stderr=json)
     columns = (
         TextColumn("{task.description}"),
