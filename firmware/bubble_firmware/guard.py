@@ -95,7 +95,7 @@ NUMBERS = const(8)
 
 MISSING_MAX = const(90000)  # µJ
 SURPLUS_MAX = const(110000)
-CLOSED_PA = const(700)  # a closed line keeps its pressure within
+CLOSED_PA = const(700)  # a closed line keeps its pressure within, and within 1/64 of it: its neighbours move
 SETTLE = const(-2)  # quiet ticks before that is begun
 READINGS = const(2)  # in a row: one alone is noise
 FED_PA = const(8000)  # which 4 mJ bring about
@@ -209,8 +209,8 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                     g[GIVEN] = g[GIVEN] - lost
                 lost += g[MISSING] - w[ALLOWED]
                 g[MISSING] = lost if lost > 0 else 0
-                if quiet:
-                    g[GIVEN] = 0
+                if quiet:  # control moves its estimate over many readings, and so do we
+                    g[GIVEN] = g[GIVEN] - (g[GIVEN] >> 4)
                 g[GIVEN] = g[GIVEN] + fed
                 more = g[SURPLUS] + found - w[ALLOWED]
                 if more <= 0:
@@ -269,7 +269,8 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                             g[SINCE] = 0
                     g[SINCE] = g[SINCE] + 1
                     change = p - g[SINCE_PA]
-                    if change > CLOSED_PA or change < 0 - CLOSED_PA:
+                    within = CLOSED_PA + (g[SINCE_PA] >> 6)
+                    if change > within or change < 0 - within:
                         g[WRONG] = g[WRONG] + 1
                         if g[WRONG] >= READINGS:
                             if change < 0:
