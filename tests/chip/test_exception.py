@@ -19,6 +19,8 @@ pytestmark = pytest.mark.chip
 SPARE_PIN = 22
 
 START = """
+import micropython
+micropython.kbd_intr(-1)
 from machine import Pin
 from bubble_firmware import boards
 from bubble_firmware.app import App, run
@@ -47,6 +49,7 @@ def skin(uf2):
         board.chip.run(1e-3)
     assert board.from_device.startswith(b"OK"), bytes(board.from_device)
     board.from_device.clear()
+    board.chip.run(1.0)  # the application is made
     with Skin(drive(AsyncSkin.open(SimulatedTransport(board, "rp2040://wristband7"), 2.0, simulated=board))) as skin:
         yield skin
 

@@ -12,6 +12,8 @@ class Pings:
     def __init__(self) -> None:
         self.number = 0
         """Of the last one sent."""
+        self.unanswered = 0
+        """How many have been sent since one was answered."""
         self._sent: dict[int, float] = {}  # when, by number
         self._answers: dict[int, wire.Received] = {}
 
@@ -26,6 +28,7 @@ class Pings:
 
     def forget(self) -> None:
         """A new session: what was sent before is not answered any more."""
+        self.unanswered = 0
         self._sent.clear()
         self._answers.clear()
 
@@ -35,6 +38,7 @@ class Pings:
         if len(self._sent) > _KEPT:
             self._sent.clear()
         self._sent[self.number] = now
+        self.unanswered += 1
         return wire.encode("PING", self.number, (token,), key=key)
 
     def settle(self, message: wire.Received) -> float | None:
@@ -42,6 +46,7 @@ class Pings:
         sent_at = self._sent.pop(message.sequence, None)
         if sent_at is None or message.id != messages.PING | messages.REPLY:
             return None
+        self.unanswered = 0
         if len(self._answers) > _KEPT:
             self._answers.clear()
         self._answers[message.sequence] = message

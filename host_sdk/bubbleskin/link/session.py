@@ -24,6 +24,8 @@ from bubbleskin.link.window import Request, Window
 KEEP_ALIVE = 0.1
 """Seconds without anything sent after which the device hears a PING."""
 
+_UNANSWERED = 3
+"""PINGs in a row without a reply after which the device may have restarted."""
 _EVENTS_KEPT = 4096
 _SLICE = 0.02
 """Seconds for which one task reads before another has its turn; and between two attempts to open a lost port."""
@@ -272,7 +274,8 @@ class Link:
         data = self._window.outgoing(now)
         if data:
             self._write(data, now)
-        if self._window.overdue and now - self._asked_at >= self._window.trip.timeout:
+        lost = self._window.overdue or self._pings.unanswered > _UNANSWERED
+        if lost and now - self._asked_at >= self._window.trip.timeout:  # is it still the same?
             self._say_hello(now)
         if now >= self._sent_at + self._quiet:
             self._send_ping(0, now)
