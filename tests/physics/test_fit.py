@@ -78,6 +78,7 @@ def test_noise_below_rest_is_no_trouble(surface):
     assert fit.parameters.mu == pytest.approx(balloon.mu, rel=0.02)
 
 
+@pytest.mark.slow
 @noisy
 def test_noise_in_height_does_not_bias():
     """Height noise alone, ten times the usual: regression of P on h would tilt the steep part."""
@@ -126,6 +127,7 @@ def test_c3_is_never_negative():
     assert fit.balloon.pressure(6.0) > 0
 
 
+@pytest.mark.slow
 def test_bands_cover_the_curve():
     h = np.linspace(5.5, 13.5, 33) * 1e-3
     inside_p, inside_h = [], []

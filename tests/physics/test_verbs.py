@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 import pytest
 
-from bubbleskin.cli.membrane import commands
+from bubbleskin.cli import membrane, plot
 from bubbleskin.errors import InvalidInput
 from bubbleskin.physics import Calibration, simulate_sheet, write_csv
 
@@ -19,7 +19,7 @@ BUBBLE = str(ROOT / "docs/data/single_bubble.csv")
 def run(capsys, monkeypatch, tmp_path):
     """Run the verbs in an empty folder; returns standard output and the exit status."""
     monkeypatch.chdir(tmp_path)
-    group = click.Group(commands={command.name: command for command in commands})
+    group = click.Group(commands={command.name: command for command in (*membrane.commands, *plot.commands)})
 
     def run(*arguments):
         status = 0
