@@ -133,10 +133,14 @@ def test_a_program_that_hangs_is_ended_by_the_watchdog_and_says_so_afterwards(em
     assert board.chip.resets == 1
     while not board.chip.connected:
         board.tick()
-    with pytest.raises(bs.DeviceRestarted):  # told once, to whoever asks when it is noticed
+
+    def ask():
         for _ in range(20):
             skin.sleep(0.1)
             skin.state()
+
+    with pytest.raises(bs.DeviceRestarted):  # told once, to whoever asks when it is noticed
+        ask()
     health = skin.health()
     assert "watchdog" in health.board_faults
     assert health.mode in ("boot", "idle")
