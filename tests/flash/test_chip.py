@@ -12,7 +12,7 @@ from bubbleskin.flash.prompt import Prompt
 pytest.importorskip("rp2040py")
 from bubbleskin.sim.rp2040.machine import PORT, EmulatedMachine
 
-pytestmark = [pytest.mark.chip, pytest.mark.slow]
+pytestmark = [pytest.mark.chip, pytest.mark.slow, pytest.mark.long]
 
 
 @pytest.fixture(scope="module")

