@@ -234,10 +234,13 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                 elif fell > DROP_PA:
                     g[EMPTIED] = 1
 
-                # Fed and still without pressure?
-                g[FED] = g[FED] + fed if p < FED_PA else 0
-                if g[FED] > FED_MAX:
-                    faults |= LEAK if p > NO_PA else NO_AIR
+                # Fed, nothing let out, and still without pressure? What now begins to flow counts from the next tick on.
+                if p >= FED_PA or g[WAS_VENT]:
+                    g[FED] = 0
+                else:
+                    if g[FED] > FED_MAX:
+                        faults |= LEAK if p > NO_PA else NO_AIR
+                    g[FED] = g[FED] + fed
 
                 # Open: the tube's loss of pressure shows, this way or the other.
                 if quiet or p < g[LOW_PA]:
