@@ -93,8 +93,8 @@ FREE_PA = const(6)  # pressure that costs no budget
 LOAD_MAX = const(7)  # Pa ticks
 NUMBERS = const(8)
 
-MISSING_MAX = const(90000)  # µJ
-SURPLUS_MAX = const(110000)
+MISSING_MAX = const(80000)  # µJ
+SURPLUS_MAX = const(90000)
 CLOSED_PA = const(700)  # a closed line keeps its pressure within, and within 1/64 of it: its neighbours move
 SETTLE = const(-2)  # quiet ticks before that is begun
 READINGS = const(2)  # in a row: one alone is noise
@@ -161,14 +161,6 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
 
         if g[WAS_STATUS] == RESTING or g[WAS_STATUS] == FAULT:
             # Vented: the pressure falls, or is gone.
-            g[MISSING] = 0
-            g[SURPLUS] = 0
-            g[RUN] = 0
-            g[FED] = 0
-            g[GIVEN] = 0
-            g[TAKEN] = 0
-            g[EMPTIED] = 0
-            g[SINCE] = SETTLE
             g[LOW_PA] = p
             g[HIGH_PA] = p
             if p > FLAT_PA:
@@ -194,50 +186,58 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
             g[FELL] = 0
             if s[LOST] == 0:
                 quiet = 1 if g[WAS_BUSY] <= 0 else 0
-                # For sure: dead times differ, so a valve may be open for less than is known.
-                on = g[WAS_FILL]
-                if on and (on < tick or g[RUN] == 0):
-                    on -= s[OPENS_US] - s[CLOSES_US] + UNSURE_US
-                fed = g[WAS_FLOW] * on // 16000 if on > 0 else 0
-
-                # The book of air. Missing is at most what has come in for sure: the rest is bad metering.
                 found = air - g[WAS_AIR] - g[WAS_DOSE]
-                lost = 0 - found
-                if lost > 0:
-                    if lost > g[GIVEN]:
-                        lost = g[GIVEN]
-                    g[GIVEN] = g[GIVEN] - lost
-                lost += g[MISSING] - w[ALLOWED]
-                g[MISSING] = lost if lost > 0 else 0
-                if quiet:  # control moves its estimate over many readings, and so do we
-                    g[GIVEN] = g[GIVEN] - (g[GIVEN] >> 4)
-                g[GIVEN] = g[GIVEN] + fed
-                more = g[SURPLUS] + found - w[ALLOWED]
-                if more <= 0:
-                    more = 0
-                    g[TAKEN] = 0
-                elif g[WAS_DOSE] < 0:
-                    g[TAKEN] = g[TAKEN] - g[WAS_DOSE]
-                g[SURPLUS] = more
-                if lost > MISSING_MAX:
-                    faults |= LEAK
-                if more > SURPLUS_MAX:
-                    faults |= VALVE_STUCK
-                    if more > g[TAKEN] + SURPLUS_MAX // 4:  # else it may be that nothing was let out
-                        g[INFLOW] = 1
+                fed = 0
+                # Where nothing has come and nothing is counted, the book stays as it is.
+                if found | g[WAS_FILL] | g[MISSING] | g[SURPLUS] | g[GIVEN] >> 4:
+                    # For sure: dead times differ, so a valve may be open for less than is known.
+                    on = g[WAS_FILL]
+                    if on and (on < tick or g[RUN] == 0):
+                        on -= s[OPENS_US] - s[CLOSES_US] + UNSURE_US
+                    fed = g[WAS_FLOW] * on // 16000 if on > 0 else 0
 
-                # No valve empties a bubble in a tick.
-                if p > FED_PA:
+                    # The book of air. Missing is at most what has come in for sure: the rest is bad metering.
+                    lost = 0 - found
+                    if lost > 0:
+                        if lost > g[GIVEN]:
+                            lost = g[GIVEN]
+                        g[GIVEN] = g[GIVEN] - lost
+                    lost += g[MISSING] - w[ALLOWED]
+                    g[MISSING] = lost if lost > 0 else 0
+                    if quiet:  # control moves its estimate over many readings, and so do we
+                        g[GIVEN] = g[GIVEN] - (g[GIVEN] >> 4)
+                    g[GIVEN] = g[GIVEN] + fed
+                    more = g[SURPLUS] + found - w[ALLOWED]
+                    if more <= 0:
+                        more = 0
+                        g[TAKEN] = 0
+                    elif g[WAS_DOSE] < 0:
+                        g[TAKEN] = g[TAKEN] - g[WAS_DOSE]
+                    g[SURPLUS] = more
+                    if lost > MISSING_MAX:
+                        faults |= LEAK
+                    if more > SURPLUS_MAX:
+                        faults |= VALVE_STUCK
+                        if more > g[TAKEN] + SURPLUS_MAX // 4:  # else it may be that nothing was let out
+                            g[INFLOW] = 1
+
+                if p >= FED_PA:
                     g[EMPTIED] = 0
-                elif g[EMPTIED]:
-                    faults |= LEAK
-                elif fell > DROP_PA:
-                    g[EMPTIED] = 1
-
-                # Fed and still without pressure?
-                g[FED] = g[FED] + fed if p < FED_PA else 0
-                if g[FED] > FED_MAX:
-                    faults |= LEAK if p > NO_PA else NO_AIR
+                    g[FED] = 0
+                else:
+                    # No valve empties a bubble in a tick.
+                    if g[EMPTIED]:
+                        faults |= LEAK
+                    elif fell > DROP_PA:
+                        g[EMPTIED] = 1
+                    # Fed, nothing let out, and still without pressure? What now begins to flow counts from the next
+                    # tick on.
+                    if g[WAS_VENT]:
+                        g[FED] = 0
+                    else:
+                        if g[FED] > FED_MAX:
+                            faults |= LEAK if p > NO_PA else NO_AIR
+                        g[FED] = g[FED] + fed
 
                 # Open: the tube's loss of pressure shows, this way or the other.
                 if quiet or p < g[LOW_PA]:
@@ -281,7 +281,17 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
                     else:
                         g[WRONG] = 0
         g[WAS_AIR] = air
-        g[WAS_STATUS] = s[STATUS]
+        if g[WAS_STATUS] != s[STATUS]:
+            g[WAS_STATUS] = s[STATUS]
+            if s[STATUS] == RESTING or s[STATUS] == FAULT:  # what only matters to a bubble under control begins anew
+                g[MISSING] = 0
+                g[SURPLUS] = 0
+                g[RUN] = 0
+                g[FED] = 0
+                g[GIVEN] = 0
+                g[TAKEN] = 0
+                g[EMPTIED] = 0
+                g[SINCE] = SETTLE
         g[WAS_DOSE] = s[DOSE]
         g[WAS_BUSY] = s[BUSY]
         g[WAS_FLOW] = s[FLOW]
@@ -336,6 +346,7 @@ class Guard:
         self.set_budget(board.BUDGET_KPA_S)
         for at in range(0, n * GUARD, GUARD):
             self._rows[at + WAS_AIR] = -1
+            self._rows[at + SINCE] = SETTLE
 
     def set_budget(self, kpa_s):
         """How much pressure times time above the threshold each bubble may have."""
