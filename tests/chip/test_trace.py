@@ -27,7 +27,7 @@ from bubble_firmware.boards.lockstep import Hands
 class Replay(Hands):
     def __init__(self):
         self.boot_id = 1
-        self.sum = 0
+        self.sum = self._phase_us = 0
         self.counts = self.link = b""
     def sense(self, counts):
         for i in range(len(counts)):
