@@ -12,12 +12,20 @@ SLOT = 16 * 1024
 
 
 def reboot(skin):
-    """Until the chip is on USB again."""
+    """Until the chip is on USB again, and the SDK has told that it has restarted."""
     board = skin.simulated
     resets = board.chip.resets
     while board.chip.resets == resets:
         board.tick()
     board.boot()
+
+    def ask():
+        for _ in range(30):
+            skin.sleep(0.1)
+            skin.state()
+
+    with pytest.raises(bs.DeviceRestarted):
+        ask()
 
 
 @pytest.mark.parametrize("name", ["wristband7", "wristband19"])

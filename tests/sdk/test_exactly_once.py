@@ -142,4 +142,4 @@ TestExactlyOnce.settings = settings(max_examples=8, stateful_step_count=25, dead
 
 @pytest.mark.slow
 class TestExactlyOnceAtLength(ExactlyOnce.TestCase):
-    settings = settings(max_examples=400, stateful_step_count=50, deadline=None)
+    settings = settings(max_examples=40, stateful_step_count=40, deadline=None)
