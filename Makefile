@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 GENERATORS := nominal_table golden_vectors protocol_page cli_page state_page draw_demo draw_membrane_figures draw_contact_figures
-EMULATED := --target rp2040://wristband7?contact=0 --target rp2040://wristband19?contact=0
+EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz generate clean

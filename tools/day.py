@@ -35,8 +35,8 @@ class Counting(SimulatedTransport):
     received = 0
 
     def write(self, data: bytes) -> None:
-        """Count the ends of frames; an empty one only ends what stood on the line."""
-        self.sent += data.count(0) if data != b"\0" else 0
+        """Count the ends of frames; a zero in front only ends what stood on the line."""
+        self.sent += data.lstrip(b"\0").count(0)
         super().write(data)
 
     def read(self, timeout: float) -> bytes:
@@ -102,10 +102,10 @@ class Day:
 
     def reconnect(self) -> None:
         """The cable is pulled in the middle of a frame, and another program says hello."""
+        self.skin.sleep(float(self.rng.uniform(0.0, 3.0)))
         self.link.write(bytes(self.rng.integers(1, 256, int(self.rng.integers(12, 60))).astype(np.uint8)))
         self.link.sent += 1  # ended by the zero of the next hello
         self.torn += 1
-        self.skin.sleep(float(self.rng.uniform(0.0, 3.0)))
         self.board.from_device.clear()
         self.skin = greet(self.link)
 
