@@ -28,7 +28,7 @@ def reboot(skin):
         ask()
 
 
-@pytest.mark.parametrize("name", ["wristband7", "wristband19"])
+@pytest.mark.parametrize("name", ["wristband7", pytest.param("wristband19", marks=pytest.mark.long)])
 def test_saved_tables_outlive_the_watchdog(emulated, name):
     skin = emulated(name)
     board = skin.simulated
