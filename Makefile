@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-GENERATORS := nominal_table golden_vectors protocol_page cli_page state_page draw_demo draw_membrane_figures draw_contact_figures
+GENERATORS := constants nominal_table golden_vectors protocol_page cli_page state_page demo_picture membrane_pictures contact_pictures
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
@@ -48,25 +48,25 @@ lint: setup
 	$(BIN)/lint-imports --no-cache --no-logo
 
 generated: setup ## fail if a generated file is out of date
-	@for tool in $(GENERATORS); do $(BIN)/python tools/$$tool.py --check || exit 1; done; echo "generated files are up to date"
+	@for tool in $(GENERATORS); do $(BIN)/python tools/generate/$$tool.py --check || exit 1; done; echo "generated files are up to date"
 
 generate: setup ## write all generated files
-	@for tool in $(GENERATORS); do $(BIN)/python tools/$$tool.py || exit 1; done
+	@for tool in $(GENERATORS); do $(BIN)/python tools/generate/$$tool.py || exit 1; done
 
 micropython: setup ## build the real MicroPython that the tests run on, once
 	$(BIN)/python tools/build_micropython.py
 
 soak: setup ## a million commands over a line that fails, ten minutes
-	$(BIN)/python tools/soak.py
+	$(BIN)/python tools/stress/soak.py
 
 fuzz: setup ## look for bytes that harm the firmware, ten minutes; keeps what it finds in tests/firmware/corpus.txt
-	$(BIN)/python tools/fuzz.py
+	$(BIN)/python tools/stress/fuzz.py
 
 bench: setup ## measure speeds
 	$(BIN)/bubbleskin bench
 
 day: setup micropython ## 24 virtual hours with faults and reconnects on MicroPython: counters and heap; most of an hour
-	$(BIN)/python tools/day.py
+	$(BIN)/python tools/stress/day.py
 
 clean: ## remove what setup and tests made here
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

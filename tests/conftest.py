@@ -8,8 +8,8 @@ import pytest
 from hypothesis import settings
 
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.interpreter import find_micropython
 from bubbleskin.sim.micropython import HEAP, source_path
+from bubbleskin.toolchain.interpreter import find_micropython
 
 # The same examples on every run, and no deadline: a busy machine is not a failure.
 settings.register_profile("house", deadline=None, derandomize=True)

@@ -8,8 +8,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from bubbleskin.build.unix import micropython
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.unix import micropython
 
 
 def main() -> int:

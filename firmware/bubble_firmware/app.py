@@ -25,32 +25,23 @@
 import gc
 from array import array
 
-from bubble_firmware import guard, safety
-from bubble_firmware.bubbles import Bubbles
-from bubble_firmware.faultlog import FaultLog
-from bubble_firmware.figures import Figures
-from bubble_firmware.selftest import SelfTest
-from bubble_firmware.sequence import Player
-from bubble_firmware.sequence_requests import SequenceRequests
-from bubble_firmware.session import Session
-from bubble_firmware.settings import Settings
-from bubble_firmware.store import Store
-from bubble_firmware.store_requests import StoreRequests
-from bubble_firmware.supply import Supply
-from bubble_firmware.table import Tables
-from bubble_firmware.ticks import bins, count, later
-from bubble_protocol import messages
-from bubble_protocol.messages import (
-    ACTIVE,
-    ESTOP,
-    EXCEPTION,
-    HOLDING,
-    IDLE,
-    OVERFILLED,
-    SELF_TEST,
-    SUPPLY_LOST,
-    VENTING,
-)
+from bubble_firmware.control.bubbles import Bubbles
+from bubble_firmware.control.supply import Supply
+from bubble_firmware.control.table import Tables
+from bubble_firmware.control.trim import Trim
+from bubble_firmware.handlers.sequence import SequenceRequests
+from bubble_firmware.handlers.store import StoreRequests
+from bubble_firmware.link.server import Session
+from bubble_firmware.safety import fault_monitor, state
+from bubble_firmware.safety.fault_log import FaultLog
+from bubble_firmware.safety.self_test import SelfTest
+from bubble_firmware.sequence.player import Player
+from bubble_firmware.store.settings import Settings
+from bubble_firmware.store.slots import Store
+from bubble_firmware.tick_stats import bins, count, later
+from bubble_protocol.schema import faults, modes, settings
+from bubble_protocol.schema.faults import ESTOP, EXCEPTION, OVERFILLED, SELF_TEST, SUPPLY_LOST, VENTING
+from bubble_protocol.schema.modes import ACTIVE, HOLDING, IDLE
 
 _TIDY_MASK = 1023  # ticks
 
@@ -77,15 +68,15 @@ class App:
         self.bubbles = Bubbles(board, self.tables)
         self.supply = Supply(board)
         self.self_test = SelfTest(board, hands.self_test)
-        self.safety = safety.Safety(board)
+        self.safety = state.Safety(board)
         self.settings = Settings(board)
-        self.guard = guard.Guard(board, self.bubbles)
+        self.guard = fault_monitor.Guard(board, self.bubbles)
         self.log = FaultLog()
         self._fault_id = 0  # of the board's newest fault
         self._fault_ids = array("i", bytearray(4 * board.BUBBLES))  # of each bubble's
         self._moving = 0
         self.fault(hands.boot_faults)
-        self.figures = Figures(board, self.bubbles)
+        self.figures = Trim(board, self.bubbles)
         self.store = Store(self, getattr(hands, "flash", None))
         self.use_settings()
         self.player = Player(self)
@@ -132,18 +123,18 @@ class App:
         if hands.alarms or supply.lost:
             self._alarm(hands.alarms)
         silence = self.safety.watch(self._moving)
-        if silence != safety.NOTHING:
+        if silence != state.NOTHING:
             self._silence(silence)
         if self.player.running:
             self.player.tick()
         bubbles.step(counts, supply.pressure_pa, self.safety.drive)
         self.guard.spare(supply.pressure_pa)
         found = self.guard.check()
-        self._moving = found & guard.MOVES
-        self.safety.settle(found & guard.PRESSED)
-        if found & (guard.NEW | guard.OVERFILLED):
+        self._moving = found & fault_monitor.MOVES
+        self.safety.settle(found & fault_monitor.PRESSED)
+        if found & (fault_monitor.NEW | fault_monitor.OVERFILLED):
             self._found(found)
-        if self.safety.mode == messages.BOOT:
+        if self.safety.mode == modes.BOOT:
             self._test()
         if self.faults & OVERFILLED:  # nothing more into it
             hands.act(bubbles.pulses, 0, 1)
@@ -167,7 +158,7 @@ class App:
         self.hands.vent()  # first of all
         self.exceptions += 1
         self.fault(EXCEPTION)
-        self.safety.take(safety.FAILED)
+        self.safety.take(state.FAILED)
         self.player.cancel()
         self.bubbles.rest()
 
@@ -179,14 +170,14 @@ class App:
             self.hands.vent()
             self.self_test.skip()
             self.player.cancel()
-            if self.safety.take(safety.ESTOP if alarms & ESTOP else safety.FAULT):
+            if self.safety.take(state.ESTOP if alarms & ESTOP else state.FAULT):
                 self.bubbles.rest()
 
     def _silence(self, event):
         if self.safety.take(event):
             self.player.cancel()
             ms = self.safety.silent * (self.board.TICK_US // 1000)
-            self.log.add(self.ticks, messages.HOST_SILENT, messages.BOARD, ms)
+            self.log.add(self.ticks, faults.HOST_SILENT, faults.BOARD, ms)
             if self.safety.mode == HOLDING:
                 self.bubbles.hold()
             else:
@@ -202,7 +193,7 @@ class App:
                     self._fault_ids[i] = self.log.add(self.ticks, bit, i, bubbles.pressure_pa(i))
                 new >>= 1
                 bit <<= 1
-        if found & guard.OVERFILLED:
+        if found & fault_monitor.OVERFILLED:
             self._alarm(OVERFILLED)
 
     def fault(self, bits):
@@ -212,7 +203,7 @@ class App:
         bit = 1
         while new:
             if new & 1:
-                self._fault_id = self.log.add(self.ticks, bit, messages.BOARD, self.supply.pressure_pa)
+                self._fault_id = self.log.add(self.ticks, bit, faults.BOARD, self.supply.pressure_pa)
             new >>= 1
             bit <<= 1
 
@@ -222,13 +213,13 @@ class App:
         if not self.self_test.running:
             if self.self_test.failed:
                 self.fault(SELF_TEST)
-            self.safety.take(safety.TESTED)
+            self.safety.take(state.TESTED)
 
     def show(self, values, first, over_ms):
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""
         self.self_test.skip()
         self.player.cancel()
-        self.safety.take(safety.SHOW)
+        self.safety.take(state.SHOW)
         if self.safety.mode == ACTIVE:
             ticks = over_ms * 1000 // self.board.TICK_US
             self.bubbles.show(values, first, ticks if ticks > 1 else 1)
@@ -237,14 +228,14 @@ class App:
         """Close all valves and keep the air, unless a fault of the board keeps the vents open."""
         self.self_test.skip()
         self.player.cancel()
-        self.safety.take(safety.STOP)
+        self.safety.take(state.STOP)
         if self.safety.mode == HOLDING:
             self.bubbles.hold()
 
     def vent(self):
         """Open all vent valves until the next `show`."""
         self.player.cancel()
-        self.safety.take(safety.VENT)
+        self.safety.take(state.VENT)
         self.bubbles.rest()
 
     def clear(self):
@@ -262,7 +253,7 @@ class App:
             self.faults = 0
             self.supply.clear()
             self.hands.clear()
-            self.safety.take(safety.CLEAR)
+            self.safety.take(state.CLEAR)
             if self.hands.alarms & ESTOP:  # still pressed
                 self._alarm(ESTOP)
 
@@ -273,8 +264,8 @@ class App:
     def use_settings(self):
         """The settings have changed."""
         values = self.settings.values
-        self.safety.set_deadman(values[messages.DEADMAN_HOLD], values[messages.DEADMAN_VENT])
-        self.guard.set_budget(values[messages.BUDGET_KPA_S])
+        self.safety.set_deadman(values[settings.DEADMAN_HOLD], values[settings.DEADMAN_VENT])
+        self.guard.set_budget(values[settings.BUDGET_KPA_S])
 
     def restart(self, into):
         """Vent and start again."""

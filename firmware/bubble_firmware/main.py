@@ -8,7 +8,7 @@ from bubble_firmware.app import App, run
 
 def lockstep(name, boot_id):
     """Run the firmware of board `name` against a plant at the other end of stdin and stdout."""
-    from bubble_firmware.boards.lockstep import Hands
+    from bubble_firmware.hal.lockstep import Hands
 
     board = boards.load(name)
     hands = Hands(board.BUBBLES, boot_id)
@@ -19,7 +19,7 @@ def lockstep(name, boot_id):
 
 def pico(name):
     """Run the firmware of board `name` on the Raspberry Pi Pico that this is."""
-    from bubble_firmware.boards.pico import Hands
+    from bubble_firmware.hal.pico import Hands
 
     board = boards.load(name)
     hands = Hands(board)  # first of all: it makes the outputs safe

@@ -4,6 +4,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from bubbleskin.connect import aconnect, connect
+from bubbleskin.device.records import Health, Info, State
+from bubbleskin.device.stored import StoreInfo, Trim
 from bubbleskin.errors import (
     BubbleskinError,
     DeviceFault,
@@ -17,15 +19,16 @@ from bubbleskin.errors import (
     WrongDevice,
 )
 from bubbleskin.layout import Layout
-from bubbleskin.playing import Played, Playing
-from bubbleskin.records import Health, Info, State
-from bubbleskin.shape import sequences
-from bubbleskin.shape.sequence import After, Repeat, Sequence, Settled, Step
+from bubbleskin.sequence import library as sequences
+from bubbleskin.sequence.model import After, Repeat, Sequence, Settled, Step
+from bubbleskin.sequence.player import Played, Playing
 from bubbleskin.skin import AsyncSkin, Skin
-from bubbleskin.stored import Figures, StoreInfo
 
 if TYPE_CHECKING:
-    from bubbleskin.physics import (
+    from bubbleskin.contact.fit import ContactFit, Measured, fit_contact
+    from bubbleskin.contact.model import CompliantContact, Shape
+    from bubbleskin.contact.rigid import RigidContact
+    from bubbleskin.membrane import (
         Calibration,
         Table,
         YeohBalloon,
@@ -36,31 +39,28 @@ if TYPE_CHECKING:
         preset,
         read_csv,
     )
-    from bubbleskin.shape.contact import CompliantContact, Shape
-    from bubbleskin.shape.fit import ContactFit, Measured, fit_contact
-    from bubbleskin.shape.plan import Plan, plan
-    from bubbleskin.shape.rigid import RigidContact
+    from bubbleskin.planner.search import Plan, plan
 
 # The physics takes scipy, which takes a second to import, and contact takes numba; a script that only shows heights
 # need not wait for them.
 _LATER = {
-    "Calibration": "physics",
-    "CompliantContact": "shape.contact",
-    "ContactFit": "shape.fit",
-    "Measured": "shape.fit",
-    "Plan": "shape.plan",
-    "RigidContact": "shape.rigid",
-    "Shape": "shape.contact",
-    "Table": "physics",
-    "YeohBalloon": "physics",
-    "YeohFit": "physics",
-    "build_table": "physics",
-    "fit_contact": "shape.fit",
-    "fit_sheet": "physics",
-    "fit_yeoh": "physics",
-    "plan": "shape.plan",
-    "preset": "physics",
-    "read_csv": "physics",
+    "Calibration": "membrane",
+    "CompliantContact": "contact.model",
+    "ContactFit": "contact.fit",
+    "Measured": "contact.fit",
+    "Plan": "planner.search",
+    "RigidContact": "contact.rigid",
+    "Shape": "contact.model",
+    "Table": "membrane",
+    "YeohBalloon": "membrane",
+    "YeohFit": "membrane",
+    "build_table": "membrane",
+    "fit_contact": "contact.fit",
+    "fit_sheet": "membrane",
+    "fit_yeoh": "membrane",
+    "plan": "planner.search",
+    "preset": "membrane",
+    "read_csv": "membrane",
 }
 
 __all__ = [
@@ -74,7 +74,6 @@ __all__ = [
     "DeviceRefused",
     "DeviceRestarted",
     "DeviceSilent",
-    "Figures",
     "Health",
     "Info",
     "InvalidInput",
@@ -96,6 +95,7 @@ __all__ = [
     "Step",
     "StoreInfo",
     "Table",
+    "Trim",
     "WrongDevice",
     "YeohBalloon",
     "YeohFit",

@@ -4,7 +4,7 @@ from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.link.session import drive
+from bubbleskin.link.link import run_sync
 from bubbleskin.link.transport import SerialTransport, Transport, only_attached
 from bubbleskin.skin import AsyncSkin, Skin
 
@@ -25,7 +25,7 @@ def connect(url: str | None = None, *, timeout: float = 2.0) -> Skin:
     """
     patience = _checked(timeout)
     transport, board = open_transport(url)
-    return Skin(drive(AsyncSkin.open(transport, patience, simulated=board)))
+    return Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board)))
 
 
 async def aconnect(url: str | None = None, *, timeout: float = 2.0) -> AsyncSkin:

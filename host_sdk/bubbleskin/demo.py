@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin.device.records import State
 from bubbleskin.errors import DeviceFault
 from bubbleskin.layout import Layout
-from bubbleskin.records import State
 from bubbleskin.shape import shapes
 from bubbleskin.skin import Skin
 

@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from bubble_protocol import messages
-from bubbleskin import safety
+from bubble_protocol.schema import sequences, system
+from bubbleskin.device import safety
+from bubbleskin.device.records import Health, Info, State, TickHistogram
+from bubbleskin.device.stored import StoreInfo, Trim
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import Clock
-from bubbleskin.link.session import Link, drive
+from bubbleskin.link.link import Link, run_sync
+from bubbleskin.link.message import Message, crc32
 from bubbleskin.link.synchronise import PINGS, ping
 from bubbleskin.link.transport import Transport
-from bubbleskin.link.wire import Received, crc32
-from bubbleskin.playing import Played, Player, Playing, Progress
-from bubbleskin.recording import Recording
-from bubbleskin.records import Health, Info, State, TickHistogram
+from bubbleskin.sequence.model import Playable
+from bubbleskin.sequence.player import Played, Player, Playing, Progress
 from bubbleskin.shape.heightfield import Heights, sample
-from bubbleskin.shape.sequence import Playable
-from bubbleskin.stored import Figures, StoreInfo
-from bubbleskin.telemetry import Telemetry
+from bubbleskin.telemetry.recording import Recording
+from bubbleskin.telemetry.stream import Telemetry
 
 if TYPE_CHECKING:
-    from bubbleskin.physics.calibration import Calibration
-    from bubbleskin.physics.table import Table
+    from bubbleskin.membrane.calibration import Calibration
+    from bubbleskin.membrane.table import Table
     from bubbleskin.sim.board import SimulatedBoard
 
 SETTLE = 3.0
@@ -76,7 +76,7 @@ class AsyncSkin:
             await link.close()
             raise
 
-    def _opened(self, reply: Received) -> None:
+    def _opened(self, reply: Message) -> None:
         """A new session: the device may have restarted, with other tables or firmware."""
         self.info = Info.of(reply)
         self._telemetry.opened()
@@ -129,7 +129,7 @@ class AsyncSkin:
 
     async def restart(self, into: str = "firmware") -> None:
         """See `Skin.restart`."""
-        numbers = {name: number for number, name, _ in messages.RESTARTS}
+        numbers = {name: number for number, name, _ in system.RESTARTS}
         if into not in numbers:
             raise InvalidInput(f"A wristband cannot restart into {into!r}; choose one of {', '.join(numbers)}.")
         await self._link.call("RESTART", (numbers[into],))
@@ -167,11 +167,11 @@ class AsyncSkin:
 
     async def pause(self) -> None:
         """See `Skin.pause`."""
-        await self._player.control(messages.PAUSE)
+        await self._player.control(sequences.PAUSE)
 
     async def resume(self) -> None:
         """See `Skin.resume`."""
-        await self._player.control(messages.RESUME)
+        await self._player.control(sequences.RESUME)
 
     async def stop(self) -> None:
         """See `Skin.stop`."""
@@ -216,7 +216,7 @@ class AsyncSkin:
 
     async def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
         """See `Skin.upload_tables`."""
-        from bubbleskin.physics.calibration import Calibration
+        from bubbleskin.membrane.calibration import Calibration
 
         n = self.info.bubbles
         if isinstance(tables, Calibration):
@@ -242,13 +242,13 @@ class AsyncSkin:
         if save:
             await self.save()
 
-    async def figures(self) -> Figures:
+    async def figures(self) -> Trim:
         """See `Skin.figures`."""
-        return Figures.of(await self._link.call("FIGURES_READ"))
+        return Trim.of(await self._link.call("TRIM_READ"))
 
-    async def upload_figures(self, figures: Figures, save: bool = False) -> None:
+    async def upload_figures(self, figures: Trim, save: bool = False) -> None:
         """See `Skin.upload_figures`."""
-        await self._link.call("FIGURES_WRITE", (), figures.rows(self.info.bubbles))
+        await self._link.call("TRIM_WRITE", (), figures.rows(self.info.bubbles))
         if save:
             await self.save()
 
@@ -266,7 +266,7 @@ class AsyncSkin:
 
     async def read_tables(self) -> "list[Table]":
         """See `Skin.read_tables`."""
-        from bubbleskin.physics.table import Table
+        from bubbleskin.membrane.table import Table
 
         tables = []
         for bubble in range(self.info.bubbles):
@@ -333,26 +333,26 @@ class Skin:
         the change should take, 0 as fast as the valves can. With `wait`, returns the state once every bubble
         has settled and raises `DeviceFault` if one does not; otherwise returns None at once.
         """
-        return drive(self._skin.show(heights_mm, over, wait))
+        return run_sync(self._skin.show(heights_mm, over, wait))
 
     def state(self) -> State:
         """Heights, pressures, targets and status of all bubbles, now."""
-        return drive(self._skin.state())
+        return run_sync(self._skin.state())
 
     def health(self) -> Health:
         """Counters since boot, free heap, supply pressure, faults of the board, outcome of the self-test."""
-        return drive(self._skin.health())
+        return run_sync(self._skin.health())
 
     def tick_histogram(self) -> TickHistogram:
         """How long the device's ticks took and how late they began, since boot."""
-        return drive(self._skin.tick_histogram())
+        return run_sync(self._skin.tick_histogram())
 
     def restart(self, into: str = "firmware") -> None:
         """Vent and start again, into the `firmware`, the `boot_loader` or MicroPython's `prompt`.
 
         Into the firmware, the next call finds the wristband again by itself; `DeviceRestarted` is for restarts nobody asked for.
         """
-        drive(self._skin.restart(into))
+        run_sync(self._skin.restart(into))
 
     def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> Iterator[State]:
         """States as the device sends them, without end; close the iterator or leave the loop to end it.
@@ -365,11 +365,11 @@ class Skin:
         states = self._skin.telemetry(rate_hz, fields)
         try:
             while True:
-                yield drive(_next(states))
+                yield run_sync(_next(states))
         except StopAsyncIteration:
             pass
         finally:
-            drive(states.aclose())
+            run_sync(states.aclose())
 
     def play(
         self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress = lambda playing: None
@@ -382,19 +382,19 @@ class Skin:
         `progress` of every step, and returns when each began; raises `DeviceFault` where it does not come to its end:
         stopped, vented, a timeout after which it was not to go on. Without, returns None once it has been started.
         """
-        return drive(self._skin.play(sequence, at, wait, progress))
+        return run_sync(self._skin.play(sequence, at, wait, progress))
 
     def playing(self) -> Playing:
         """How far the sequence is that was played last, or how it ended."""
-        return drive(self._skin.playing())
+        return run_sync(self._skin.playing())
 
     def pause(self) -> None:
         """Let the sequence and its ramps stand still; the shape of this moment is held."""
-        drive(self._skin.pause())
+        run_sync(self._skin.pause())
 
     def resume(self) -> None:
         """Go on with a sequence that was paused, from where it was."""
-        drive(self._skin.resume())
+        run_sync(self._skin.resume())
 
     def record(
         self,
@@ -410,53 +410,53 @@ class Skin:
         per bubble and quantity. A program that is killed leaves all rows so far, in Parquet's case in
         `NAME.partial.csv`. Parquet needs the extra `bubbleskin[parquet]`.
         """
-        return drive(self._skin.record(path, rate_hz, seconds, fields))
+        return run_sync(self._skin.record(path, rate_hz, seconds, fields))
 
     def synchronise(self, pings: int = PINGS) -> Clock:
         """Send pings at once and return the clock, which knows the better for them."""
-        return drive(self._skin.synchronise(pings))
+        return run_sync(self._skin.synchronise(pings))
 
     @property
     def clock(self) -> Clock:
         """The device's clock: `now()`, `at(host_time)`, `offset`, `drift_ppm` and `uncertainty`; pings it if need be."""
         if self._skin.clock.age > _CLOCK_AGE:
-            drive(self._skin.synchronise())
+            run_sync(self._skin.synchronise())
         return self._skin.clock
 
     def stop(self) -> None:
         """Close all valves and keep the air, until the next `show` or `play`; ends a sequence."""
-        drive(self._skin.stop())
+        run_sync(self._skin.stop())
 
     def vent(self) -> None:
         """Open all vent valves, until the next `show`."""
-        drive(self._skin.vent())
+        run_sync(self._skin.vent())
 
     def faults(self) -> dict[int, tuple[str, ...]]:
         """The faults of every bubble that has some."""
-        return drive(self._skin.faults())
+        return run_sync(self._skin.faults())
 
     def clear_faults(self) -> None:
         """Acknowledge all faults, the board's too: they are forgotten; what still is wrong faults again."""
-        drive(self._skin.clear_faults())
+        run_sync(self._skin.clear_faults())
 
     def fault_log(self) -> list[safety.Fault]:
         """What has gone wrong since the wristband's start, oldest first: the last 16 entries, with ids and times.
 
         It also has what is no fault of `faults()`: `host_silent`, when a deadman's stage was reached.
         """
-        return drive(self._skin.fault_log())
+        return run_sync(self._skin.fault_log())
 
     def acknowledge(self, fault: safety.Fault | int) -> None:
         """Acknowledge faults up to this entry of `fault_log`, or its id; what has come since stays."""
-        drive(self._skin.acknowledge(fault))
+        run_sync(self._skin.acknowledge(fault))
 
     def settings(self) -> dict[str, safety.Setting]:
         """What can be set: deadman_hold, deadman_vent (s), budget_kpa_s; values in use and this wristband's limits."""
-        return drive(self._skin.settings())
+        return run_sync(self._skin.settings())
 
     def configure(self, **wanted: float) -> None:
         """Change settings, all or none: `configure(deadman_vent=5.0)`. `InvalidInput` beyond the wristband's limits."""
-        drive(self._skin.configure(**wanted))
+        run_sync(self._skin.configure(**wanted))
 
     def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
         """Use other height to pressure tables, until the device restarts; all or none are taken.
@@ -464,15 +464,15 @@ class Skin:
         `tables`: one per bubble in layout order, one for all, or a calibration of this kind of board. With `save` they are
         kept for good, see there.
         """
-        drive(self._skin.upload_tables(tables, save))
+        run_sync(self._skin.upload_tables(tables, save))
 
-    def figures(self) -> Figures:
+    def figures(self) -> Trim:
         """What sets each bubble apart besides its table: sensor zero, dead times, flow."""
-        return drive(self._skin.figures())
+        return run_sync(self._skin.figures())
 
-    def upload_figures(self, figures: Figures, save: bool = False) -> None:
+    def upload_figures(self, figures: Trim, save: bool = False) -> None:
         """Use other figures, until the device restarts; only while it is vented. With `save` they are kept for good."""
-        drive(self._skin.upload_figures(figures, save))
+        run_sync(self._skin.upload_figures(figures, save))
 
     def save(self) -> StoreInfo:
         """Keep the tables, figures and settings in use without power, for every start from now on; returns the store's state.
@@ -480,27 +480,27 @@ class Skin:
         Only while vented: writing flash stops the device for some 0.1 s, and it would control nothing. If power fails
         meanwhile, all is as it was before, or all is saved. What is saved already is not written again.
         """
-        return drive(self._skin.save())
+        return run_sync(self._skin.save())
 
     def stored(self) -> StoreInfo:
         """The state of the store: where what is in use comes from, both slots, wear."""
-        return drive(self._skin.stored())
+        return run_sync(self._skin.stored())
 
     def factory_reset(self) -> StoreInfo:
         """Forget what is stored and use what the firmware was made with; only while vented."""
-        return drive(self._skin.factory_reset())
+        return run_sync(self._skin.factory_reset())
 
     def read_tables(self) -> "list[Table]":
         """The tables in use, one per bubble."""
-        return drive(self._skin.read_tables())
+        return run_sync(self._skin.read_tables())
 
     def sleep(self, seconds: float) -> None:
         """Wait on the device's clock: virtual time on a simulated board, real time on a real one."""
-        drive(self._skin.sleep(seconds))
+        run_sync(self._skin.sleep(seconds))
 
     def close(self) -> None:
         """Let go of the device. Without a host it holds what moves after 250 ms and vents after 1 s, see `settings`."""
-        drive(self._skin.aclose())
+        run_sync(self._skin.aclose())
 
     def __enter__(self) -> Self:
         return self

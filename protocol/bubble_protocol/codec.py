@@ -7,8 +7,8 @@ over. A text takes 16 values. An unsigned 32-bit value above 2**31 - 1 stands in
 
 from array import array
 
-from bubble_protocol.messages import FIRST_SIZES, MESSAGES, TEXT
-from bubble_protocol.portable import micropython, ptr8, ptr32
+from bubble_protocol.mpy_compat import micropython, ptr8, ptr32
+from bubble_protocol.schema.messages import FIRST_SIZES, MESSAGES, TEXT
 
 
 @micropython.viper
@@ -143,7 +143,7 @@ class Message:
             _unpack(self._repeated_kinds, values, payload, self.stride_values, count, self.fixed_values, index)
         return count
 
-    def outside(self, values, count):
+    def first_out_of_range(self, values, count):
         """The index of the first of `values` that is outside the schema's limits, -1 where all are within."""
         end = self.fixed_values + count * self.stride_values
         return _outside(values, self._lows, self._highs, self.fixed_values, self.stride_values, end)

@@ -7,7 +7,7 @@ the same shape that calls crcmod. The tests hold crcmod, zlib, binascii and this
 
 from array import array
 
-from bubble_protocol.portable import micropython, ptr8, ptr32
+from bubble_protocol.mpy_compat import micropython, ptr8, ptr32
 
 _POLYNOMIAL_LOW, _POLYNOMIAL_HIGH = 0x8320, 0xEDB8  # 0xEDB88320, bits reversed
 

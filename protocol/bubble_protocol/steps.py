@@ -14,7 +14,7 @@ nested cannot go round for ever without time passing. All of it runs on host and
 """
 
 from bubble_protocol.crc import _TABLE
-from bubble_protocol.portable import const, micropython, ptr32
+from bubble_protocol.mpy_compat import const, micropython, ptr32
 
 STEP, REPEAT, END = range(3)
 LINEAR, SMOOTH, IN, OUT = range(4)

@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
-from bubbleskin.build import rp2040
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain import rp2040
 
 FILES = {"firmware/manifest.py": b"1", "firmware/bubble_firmware/main.py": b"2"}
 

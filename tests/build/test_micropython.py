@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bubbleskin import interpreter
-from bubbleskin.build import debian, steps, unix
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain import debian, interpreter, steps, unix
 
 TOOL = Path(__file__).parents[2] / "tools" / "build_micropython.py"
 

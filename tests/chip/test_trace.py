@@ -10,11 +10,11 @@ from array import array
 import pytest
 
 from bubble_firmware import boards
-from bubbleskin.build.rp2040 import BARE
-from bubbleskin.link.session import drive
+from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import InProcessFirmware, SimulatedBoard
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.toolchain.rp2040 import BARE
 
 pytestmark = pytest.mark.chip
 
@@ -22,7 +22,7 @@ REPLAY = """
 import binascii
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_firmware.boards.lockstep import Hands
+from bubble_firmware.hal.lockstep import Hands
 
 class Replay(Hands):
     def __init__(self):
@@ -84,7 +84,7 @@ def recording(request):
     """Differing bubbles take two shapes, hold, and one of them gets a leak."""
     recording = Recording(request.param)
     board = SimulatedBoard(request.param, seed=5, spread=0.08, firmware=recording)
-    skin = Skin(drive(AsyncSkin.open(SimulatedTransport(board, "recorded"), 2.0, simulated=board)))
+    skin = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, "recorded"), 2.0, simulated=board)))
     n = skin.info.bubbles
     skin.show([7.0 + 5.0 * i / n for i in range(n)], wait=False)
     skin.sleep(TICKS * 0.4 * board.tick_s)

@@ -6,12 +6,15 @@ from itertools import pairwise
 
 import pytest
 
-from bubble_firmware import boards, control
+from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_protocol import codec, messages, steps
-from bubble_protocol.messages import HELLO, PING, SEQUENCE_ENDED, STEP_BEGUN
+from bubble_firmware.control.step import ROW, SETPOINT
+from bubble_protocol import codec, steps
+from bubble_protocol.schema import messages
+from bubble_protocol.schema.messages import HELLO, PING
+from bubble_protocol.schema.sequences import SEQUENCE_ENDED, STEP_BEGUN
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.link import wire
+from bubbleskin.link import message as wire
 
 SESSION = 0x89ABCDEF
 
@@ -300,7 +303,7 @@ class Sequencer:
     def setpoints(self):
         """µm, where the ramps are now."""
         rows = self.rig.app.bubbles._rows
-        return [rows[i * control.ROW + control.SETPOINT] / 16 for i in range(self.n)]
+        return [rows[i * ROW + SETPOINT] / 16 for i in range(self.n)]
 
 
 @pytest.fixture

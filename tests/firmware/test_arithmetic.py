@@ -10,39 +10,44 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_firmware import boards, control, curve, guard, nominal, table
-from bubble_firmware.bubbles import Bubbles
-from bubble_protocol import codec, messages
+from bubble_firmware import boards
+from bubble_firmware.control import curve, nominal, table
+from bubble_firmware.control import step as control
+from bubble_firmware.control.bubbles import Bubbles
+from bubble_firmware.safety import fault_monitor
+from bubble_protocol import codec
+from bubble_protocol.schema import faults, modes, statuses
 from bubbleskin import Table, YeohBalloon, build_table
 
 BOARD = boards.load("wristband7")
 ATMOSPHERE = 101325.0
 
-SCHEMA = [entry[1].upper() for entry in (*messages.MODES, *messages.STATUSES, *messages.FAULTS)]
+SCHEMA = [entry[1].upper() for entry in (*modes.MODES, *statuses.STATUSES, *faults.FAULTS)]
 REPEATED = [name for name in SCHEMA if hasattr(control, name)]
 
 
 def test_what_control_repeats_of_the_schema_is_the_schemas():
     """It repeats them because MicroPython's compiler folds constants of the same module only."""
-    assert {name: getattr(control, name) for name in REPEATED} == {name: getattr(messages, name) for name in REPEATED}
-    known = {name: getattr(messages, name) for name in (*SCHEMA, "VENTED") if hasattr(guard, name)}
-    assert {name: getattr(guard, name) for name in known} == known
+    said = {**vars(modes), **vars(statuses), **vars(faults)}
+    assert {name: getattr(control, name) for name in REPEATED} == {name: said[name] for name in REPEATED}
+    known = {name: said[name] for name in SCHEMA if hasattr(fault_monitor, name)}
+    assert {name: getattr(fault_monitor, name) for name in known} == known
     assert set(SCHEMA) <= {*REPEATED, *known, "IDLE", "HOLDING", "BOOT", "VENTING", "FAULTED"}
 
 
 def test_what_the_guard_repeats_of_control_is_controls():
-    lines = Path(guard.__file__).read_text(encoding="utf-8").split("# From the schema")[0].splitlines()
+    lines = Path(fault_monitor.__file__).read_text(encoding="utf-8").split("# From the schema")[0].splitlines()
     names = [line.split(" = const(")[0] for line in lines if " = const(" in line]
     assert len(names) > 15
-    assert {name: getattr(guard, name) for name in names} == {name: getattr(control, name) for name in names}
+    assert {name: getattr(fault_monitor, name) for name in names} == {name: getattr(control, name) for name in names}
 
 
 def test_the_guards_rows_do_not_overlap():
-    lines = Path(guard.__file__).read_text(encoding="utf-8").splitlines()
+    lines = Path(fault_monitor.__file__).read_text(encoding="utf-8").splitlines()
     names = [line.split(" = const(")[0] for line in lines if " = const(" in line]
     for first, end in (("WAS_AIR", "GUARD"), ("ALLOWED", "NUMBERS")):
         row = names[names.index(first) : names.index(end) + 1]
-        assert [getattr(guard, name) for name in row] == list(range(len(row)))
+        assert [getattr(fault_monitor, name) for name in row] == list(range(len(row)))
 
 
 def test_rows_do_not_overlap():
@@ -95,7 +100,7 @@ def test_a_tables_pressure_is_the_sdks(mine, heights, first):
 def test_on_micropython_too(micropython):
     said = micropython(
         """
-        from bubble_firmware import nominal, table
+        from bubble_firmware.control import nominal, table
         knots = bytearray(b"".join(h.to_bytes(2, "little") + p.to_bytes(2, "little") for h, p in nominal.KNOTS))
         total = 0
         for height in range(4000, 15000):
@@ -174,7 +179,7 @@ def test_pressure_is_read_back_as_the_tables_height(name):
     for step in range(0, int(made.pressure_pa.max()) // BOARD.SENSOR_PA_PER_COUNT, 7):
         counts[0] = BOARD.SENSOR_ZERO + step
         for _ in range(9):
-            bubbles.step(counts, 60000, messages.VENTED)
+            bubbles.step(counts, 60000, modes.IDLE)
         pressure = step * BOARD.SENSOR_PA_PER_COUNT
         assert (
             bubbles._rows[control.HEIGHT] / 16

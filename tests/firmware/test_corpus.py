@@ -10,7 +10,7 @@ CORPUS = (Path(__file__).parent / "corpus.txt").read_text().split()
 
 @pytest.fixture(scope="module")
 def target():
-    path = Path(__file__).parents[2] / "tools/fuzz_target.py"
+    path = Path(__file__).parents[2] / "tools/stress/fuzz_target.py"
     spec = importlib.util.spec_from_file_location("fuzz_target", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -4,9 +4,10 @@ import random
 
 import pytest
 
-from bubble_firmware import delivery
-from bubble_protocol import codec, messages
-from bubbleskin.link import wire
+from bubble_firmware.link import receive_window
+from bubble_protocol import codec
+from bubble_protocol.schema import errors, messages, modes
+from bubbleskin.link.message import Reader, encode, session_key
 
 SHOW_REPLY = messages.SHOW | messages.REPLY
 
@@ -57,14 +58,14 @@ def test_a_request_that_comes_twice_is_applied_once_and_answered_twice(device):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_whatever_order_they_come_in_they_are_applied_in_theirs(device, seed):
-    order = list(range(1, 1 + delivery.WINDOW))
+    order = list(range(1, 1 + receive_window.WINDOW))
     random.Random(seed).shuffle(order)
     for number in order:
         device.send(show(device, number))
         device.tick()
     device.tick(4)
-    assert device.applied == applied(*range(1, 1 + delivery.WINDOW))
-    assert [number for number, _ in device.said()] == list(range(1, 1 + delivery.WINDOW))
+    assert device.applied == applied(*range(1, 1 + receive_window.WINDOW))
+    assert [number for number, _ in device.said()] == list(range(1, 1 + receive_window.WINDOW))
 
 
 def test_only_some_are_handled_in_one_tick(device):
@@ -89,7 +90,7 @@ def test_the_numbers_come_round(device):
     assert [number for number, _ in device.said()] == [0xFFFD, 0xFFFE, 0xFFFF, 0, 1, 2, 0xFFFD, 0]
 
 
-@pytest.mark.parametrize("number", [1 + delivery.WINDOW, 100, 0x8000, 0xFFFF - delivery.KEPT])
+@pytest.mark.parametrize("number", [1 + receive_window.WINDOW, 100, 0x8000, 0xFFFF - receive_window.KEPT])
 def test_what_is_far_from_its_turn_is_dropped(device, number):
     device.send(show(device, number))
     device.tick(3)
@@ -97,7 +98,7 @@ def test_what_is_far_from_its_turn_is_dropped(device, number):
 
 
 @pytest.mark.parametrize("urgent", ["STOP", "VENT"])
-@pytest.mark.parametrize("ahead", [0, 1, 5, delivery.KEPT - 1])
+@pytest.mark.parametrize("ahead", [0, 1, 5, receive_window.KEPT - 1])
 def test_stop_and_vent_overtake(device, urgent, ahead):
     device.send(show(device, 1))
     device.tick()
@@ -106,13 +107,13 @@ def test_stop_and_vent_overtake(device, urgent, ahead):
         device.send(show(device, 3))  # it waits for 2
     device.send(device.encode(urgent, number))
     device.tick()
-    assert device.app.mode == {"STOP": messages.HOLDING, "VENT": messages.MODE_VENTING}[urgent]
+    assert device.app.mode == {"STOP": modes.HOLDING, "VENT": modes.VENTING}[urgent]
     reply = codec.BY_NAME[urgent].id | messages.REPLY
     assert device.said() == [(1, SHOW_REPLY), (number, reply)]
     skipped = range(2, number)
     device.send(*(show(device, late) for late in skipped), device.encode(urgent, number))
     device.tick(2)
-    assert device.said() == [*((late, messages.OVERTAKEN) for late in skipped), (number, reply)]
+    assert device.said() == [*((late, errors.OVERTAKEN) for late in skipped), (number, reply)]
     assert device.applied == applied(1)
     device.send(show(device, number + 1))
     device.tick()
@@ -123,18 +124,18 @@ def test_what_was_sent_after_a_vent_and_comes_before_it_is_applied_after_it(devi
     device.send(show(device, 3), device.encode("VENT", 2), show(device, 1))
     device.tick(2)
     assert device.applied == applied(3)
-    assert device.app.mode == messages.ACTIVE
-    assert dict(device.said())[1] == messages.OVERTAKEN
+    assert device.app.mode == modes.ACTIVE
+    assert dict(device.said())[1] == errors.OVERTAKEN
 
 
 def test_frames_without_the_key_of_boot_and_session_are_none(device):
     bad = device.app.session._decoder.bad
     for key in (
         b"\0" * 4,
-        wire.session_key(device.hands.boot_id, 5),
-        wire.session_key(device.hands.boot_id ^ 1, device.session),
+        session_key(device.hands.boot_id, 5),
+        session_key(device.hands.boot_id ^ 1, device.session),
     ):
-        device.send(wire.encode("VENT", 1, key=key))
+        device.send(encode("VENT", 1, key=key))
     device.tick()
     assert device.said() == []
     assert device.app.session._decoder.bad == bad + 3
@@ -144,21 +145,21 @@ def test_a_new_session_begins_anew_and_a_late_greeting_does_not_end_it(device):
     device.send(show(device, 1))
     device.tick()
     old = show(device, 2)
-    assert device.open(7)["window"] == delivery.WINDOW
+    assert device.open(7)["window"] == receive_window.WINDOW
     device.send(old, show(device, 1))
     device.tick()
     assert device.applied == applied(1, 1), "number 1 of another session is another request"
-    hello = wire.encode("HELLO", 70, (2, 2, 0x89ABCDEF))
+    hello = encode("HELLO", 70, (2, 2, 0x89ABCDEF))
     device.heard()
     device.send(hello, show(device, 2))
     device.tick()
-    assert device.said() == [(70, messages.OVERTAKEN), (2, SHOW_REPLY)]
+    assert device.said() == [(70, errors.OVERTAKEN), (2, SHOW_REPLY)]
     for session in range(100, 114):
         device.open(session)
     device.heard()
     device.send(hello)
     device.tick()
-    assert device.said() == [(70, messages.OVERTAKEN)], "the last sixteen are remembered"
+    assert device.said() == [(70, errors.OVERTAKEN)], "the last sixteen are remembered"
 
 
 def test_a_greeting_of_the_open_session_changes_nothing(device):
@@ -166,7 +167,7 @@ def test_a_greeting_of_the_open_session_changes_nothing(device):
     device.send(show(device, 2))
     device.tick()
     device.said()
-    device.send(wire.encode("HELLO", 71, (2, 2, device.session)), show(device, 2), show(device, 3))
+    device.send(encode("HELLO", 71, (2, 2, device.session)), show(device, 2), show(device, 3))
     device.tick(6)
     said = device.said()
     assert [answer for answer in said if answer[1] != messages.TELEMETRY] == [
@@ -179,23 +180,23 @@ def test_a_greeting_of_the_open_session_changes_nothing(device):
 
 
 def test_a_session_without_a_number_is_refused(device):
-    device.send(wire.encode("HELLO", 72, (2, 2, 0)))
+    device.send(encode("HELLO", 72, (2, 2, 0)))
     device.tick()
-    assert device.said() == [(72, messages.OUT_OF_RANGE)]
+    assert device.said() == [(72, errors.OUT_OF_RANGE)]
 
 
 def test_a_host_of_protocol_1_is_refused_in_words_it_knows(device):
     """Its HELLO has no session."""
-    from bubble_protocol import framing
     from bubble_protocol.crc import crc32_into
+    from bubble_protocol.frame import FRAME_MAX, HEADER, finish_frame, put_header
 
-    frame = bytearray(framing.FRAME_MAX)
-    framing.put_header(frame, messages.HELLO, 1)
+    frame = bytearray(FRAME_MAX)
+    put_header(frame, messages.HELLO, 1)
     frame[4:6] = bytes((1, 1))
-    device.send(bytes(frame[: framing.seal(frame, framing.HEADER + 2, crc32_into)]))
+    device.send(bytes(frame[: finish_frame(frame, HEADER + 2, crc32_into)]))
     device.tick()
-    (answer,) = wire.Reader().feed(bytes(device.hands.from_device))
-    assert (answer["error"], answer["low"], answer["high"]) == (messages.NO_COMMON_PROTOCOL, 2, 2)
+    (answer,) = Reader().feed(bytes(device.hands.from_device))
+    assert (answer["error"], answer["low"], answer["high"]) == (errors.NO_COMMON_PROTOCOL, 2, 2)
 
 
 def test_a_reply_that_found_no_room_goes_out_later_in_order_and_before_telemetry(device):
@@ -222,6 +223,6 @@ def test_every_frame_of_the_session_is_heard(device):
     session = device.app.session
     before = session.heard
     device.send(device.encode("PING", 9, (1,)), show(device, 1), show(device, 1), show(device, 500))
-    device.send(wire.encode("PING", 9, (1,)))
+    device.send(encode("PING", 9, (1,)))
     device.tick()
     assert session.heard == before + 4

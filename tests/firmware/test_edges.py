@@ -5,15 +5,18 @@ import itertools
 import pytest
 
 from bubble_firmware import boards
-from bubble_protocol import codec, framing, messages
+from bubble_protocol import codec
 from bubble_protocol.crc import crc32_into
-from bubbleskin.link import wire
+from bubble_protocol.frame import FRAME_MAX, HEADER, PAYLOAD_MAX, finish_frame, put_header
+from bubble_protocol.schema import messages
+from bubbleskin.link.message import encode, session_key
 
 SESSION = 0x13579BDF
 
 SCRIPT = """
 import gc, sys
-from bubble_firmware import boards, control
+from bubble_firmware import boards
+from bubble_firmware.control import step as control
 from bubble_firmware.app import App
 
 class Hands:
@@ -90,10 +93,10 @@ print(frames, unanswered, beyond, hands.wide, app.exceptions, free - gc.mem_free
 
 
 def sealed(message_id, number, payload):
-    frame = bytearray(framing.FRAME_MAX)
-    framing.put_header(frame, message_id, number & 0xFFFF)
+    frame = bytearray(FRAME_MAX)
+    put_header(frame, message_id, number & 0xFFFF)
     frame[4 : 4 + len(payload)] = payload
-    return bytes(frame[: framing.seal(frame, framing.HEADER + len(payload), crc32_into, wire.session_key(1, SESSION))])
+    return bytes(frame[: finish_frame(frame, HEADER + len(payload), crc32_into, session_key(1, SESSION))])
 
 
 def of_kind(kind, low, high):
@@ -118,14 +121,14 @@ def payloads(message, bubbles):
         for place, field in enumerate(fields[: len(message.fixed) + 2 * len(message.repeated)]):
             for value in of_kind(field[1], field[3], field[4]):
                 yield b"".join([*middle[:place], value, *middle[place + 1 :]])
-    for size in range(framing.PAYLOAD_MAX + 1):
+    for size in range(PAYLOAD_MAX + 1):
         for byte in (0, 1, 0xFF):
             yield bytes([byte]) * size
 
 
 def frames(board, every):
     """One payload of so many of each message. HELLO, then everything; whoever opens another session would end this one."""
-    yield wire.encode("HELLO", 0, (2, 2, SESSION))
+    yield encode("HELLO", 0, (2, 2, SESSION))
     numbers = itertools.count(1)
     heights = [(13000 - 100 * bubble).to_bytes(2, "little") for bubble in range(board.BUBBLES)]
     yield sealed(messages.SHOW, next(numbers), b"".join([b"\0\0", *heights]))
@@ -135,7 +138,7 @@ def frames(board, every):
                 session = SESSION.to_bytes(4, "little") if len(payload) >= 6 else bytes(4)
                 payload = (payload[:2] + session)[: len(payload)] + payload[6:]
             aside = message.id in (messages.HELLO, messages.PING)
-            if len(payload) <= framing.PAYLOAD_MAX:
+            if len(payload) <= PAYLOAD_MAX:
                 yield sealed(message.id, 0 if aside else next(numbers), payload)
     for message_id in range(256):
         if message_id not in codec.BY_ID:

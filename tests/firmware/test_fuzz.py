@@ -4,15 +4,17 @@ import random
 
 import pytest
 
-from bubble_protocol import codec, framing, messages
+from bubble_protocol import codec
 from bubble_protocol.crc import crc32_into
-from bubbleskin.link import wire
+from bubble_protocol.frame import FRAME_MAX, HEADER, PAYLOAD_MAX, finish_frame, put_header
+from bubble_protocol.schema import messages
+from bubbleskin.link.message import encode, session_key
 
 SCRIPT = """
 import gc, random, sys
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_protocol import framing
+from bubble_protocol import frame as framing
 from bubble_protocol.crc import crc32_into
 
 TELEMETRY = 0x07
@@ -237,7 +239,7 @@ def well_formed(total):
         if frame[1] == 1:  # HELLO: of the session that is open, or of none
             for i in range(4):
                 frame[6 + i] = 0xAB if size >= 6 and not few else 0
-        end = framing.seal(frame, framing.HEADER + size, crc32_into, key)
+        end = framing.finish_frame(frame, framing.HEADER + size, crc32_into, key)
         line = hands.line
         for i in range(end):
             line[i] = frame[i]
@@ -277,18 +279,18 @@ SESSION = 0xABABABAB
 def valid_frames():
     """HELLO, then every request and some replies, short and as long as they get; the first is the good one."""
     chance = random.Random(5)
-    key = wire.session_key(1, SESSION)
-    frames = [wire.encode("HELLO", 1, (2, 2, SESSION)), wire.encode("PING", 0x1234, (0x00C0FFEE,), key=key)]
+    key = session_key(1, SESSION)
+    frames = [encode("HELLO", 1, (2, 2, SESSION)), encode("PING", 0x1234, (0x00C0FFEE,), key=key)]
     for message in codec.BY_ID.values():
-        room = (framing.PAYLOAD_MAX - message.fixed_size) // message.stride if message.stride else 0
+        room = (PAYLOAD_MAX - message.fixed_size) // message.stride if message.stride else 0
         for count in {0, min(7, room), room}:
             size = message.fixed_size + count * message.stride
-            frame = bytearray(framing.FRAME_MAX)
-            framing.put_header(frame, message.id, chance.randrange(1 << 16))
+            frame = bytearray(FRAME_MAX)
+            put_header(frame, message.id, chance.randrange(1 << 16))
             frame[4 : 4 + size] = bytes(chance.choice([0, 1, chance.randrange(256)]) for _ in range(size))
             if message.id == messages.HELLO:  # which must not open another session
                 frame[4 : 4 + size] = bytes([0, 2, 0xAB, 0xAB, 0xAB, 0xAB])
-            frames.append(bytes(frame[: framing.seal(frame, framing.HEADER + size, crc32_into, key)]))
+            frames.append(bytes(frame[: finish_frame(frame, HEADER + size, crc32_into, key)]))
     return frames
 
 
@@ -325,16 +327,16 @@ def test_every_well_formed_frame_is_answered_once(rig):
     """Here, where an integer too large for its place is an exception: any id, any payload."""
     chance = random.Random(2)
     fitting = [2 * rig.board.BUBBLES + 2, 3 + 4 * 20, 1, 2, 4]
-    frame = bytearray(framing.FRAME_MAX)
+    frame = bytearray(FRAME_MAX)
     for _ in range(2000):
         size = chance.choice([*fitting, chance.randrange(248)])
         message_id = chance.choice([chance.randrange(16), chance.randrange(256)])
-        framing.put_header(frame, message_id, rig.app.session._delivery.expected)
+        put_header(frame, message_id, rig.app.session._delivery.expected)
         largest = chance.choice([8, 64, 256])
         frame[4 : 4 + size] = bytes(chance.randrange(largest) for _ in range(size))
         if message_id == messages.HELLO:  # which must not open another session
             frame[6:10] = rig.session.to_bytes(4, "little") if size >= 6 else bytes(4)
-        rig.hands.to_device += frame[: framing.seal(frame, framing.HEADER + size, crc32_into, rig.key)]
+        rig.hands.to_device += frame[: finish_frame(frame, HEADER + size, crc32_into, rig.key)]
         rig.tick(2)
         answers = [message for message in rig.heard() if message.id != messages.TELEMETRY]
         assert len(answers) == 1

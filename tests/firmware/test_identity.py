@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from bubble_firmware import boards
-from bubble_firmware.nominal import KNOTS
-from bubble_protocol import messages, steps
-from bubbleskin.link import wire
+from bubble_firmware.control.nominal import KNOTS
+from bubble_protocol import steps
+from bubble_protocol.schema import faults, messages, sequences
+from bubbleskin.link.message import Reader, encode, session_key
 from bubbleskin.sim import SimulatedBoard
 from bubbleskin.sim.board import InProcessFirmware
 from bubbleskin.sim.micropython import MicroPythonFirmware
@@ -37,8 +38,8 @@ class Recorder:
 
 
 PONG = messages.PING | messages.REPLY
-KEY = wire.session_key(BOOT_ID, 1)
-ALIVE = wire.encode("PING", 1, (0,), (), KEY)
+KEY = session_key(BOOT_ID, 1)
+ALIVE = encode("PING", 1, (0,), (), KEY)
 """A host that lives says so."""
 
 
@@ -46,12 +47,12 @@ class Host:
     """Frames of one session, numbered as they come."""
 
     def __init__(self):
-        self.hello = b"\xff\0" + wire.encode("HELLO", 1, (2, 2, 1))
+        self.hello = b"\xff\0" + encode("HELLO", 1, (2, 2, 1))
         self.numbers = itertools.count(1)
 
     def ask(self, name, fixed=(), repeated=()):
         number = 77 if name == "PING" else next(self.numbers)  # which is outside the order
-        return wire.encode(name, number, fixed, repeated, KEY)
+        return encode(name, number, fixed, repeated, KEY)
 
     def show(self, over_ms, heights):
         return self.ask("SHOW", (over_ms,), [(height,) for height in heights])
@@ -139,7 +140,7 @@ def test_a_recorded_trace_replays_bit_for_bit(trace):
     assert_same(decided, replay(MicroPythonFirmware(data, BOOT_ID), given))
 
     # The trace is one that says something: every answer, both kinds of valves on every bubble, faults.
-    heard = list(wire.Reader(KEY).feed(b"".join(outputs.link for outputs in decided)))
+    heard = list(Reader(KEY).feed(b"".join(outputs.link for outputs in decided)))
     telemetry = [message for message in heard if message.id == messages.TELEMETRY]
     answers = [message.sequence for message in heard if message.id not in (messages.TELEMETRY, PONG)]
     assert answers == [1, *range(1, 19)], "HELLO, then every request, each once"
@@ -149,7 +150,7 @@ def test_a_recorded_trace_replays_bit_for_bit(trace):
     assert (doses[:, :, 0].sum(axis=0) > 10).all()
     assert doses[:, :, 1].sum() > 100
     assert {message.id for message in heard} >= {messages.TABLE_COMMIT | messages.REPLY, messages.ERROR}
-    assert {fault for message in telemetry for fault in message.columns["faults"]} >= {0, messages.SENSOR_LOST}
+    assert {fault for message in telemetry for fault in message.columns["faults"]} >= {0, faults.SENSOR_LOST}
 
 
 def hostile(seed, board, ticks):
@@ -191,7 +192,7 @@ def test_what_no_plant_would_do_is_computed_the_same(seed):
     given = list(hostile(seed, data, 2000))
     decided = replay(InProcessFirmware(data, BOOT_ID), given)
     assert_same(decided, replay(MicroPythonFirmware(data, BOOT_ID), given))
-    heard = list(wire.Reader(KEY).feed(b"".join(outputs.link for outputs in decided)))
+    heard = list(Reader(KEY).feed(b"".join(outputs.link for outputs in decided)))
     assert not [message for message in heard if message.id == messages.ERROR]
     assert len({tuple(outputs.pulses) for outputs in decided}) > 50
 
@@ -224,9 +225,9 @@ def sequence(n):
     yield ask("SEQUENCE_ARM", (0xFFFF,))
     yield ask("SEQUENCE_START", (0xFFFF, 50))
     yield from [ALIVE] * 150
-    yield ask("SEQUENCE_CONTROL", (0xFFFF, messages.PAUSE))
+    yield ask("SEQUENCE_CONTROL", (0xFFFF, sequences.PAUSE))
     yield from [ALIVE] * 30
-    yield ask("SEQUENCE_CONTROL", (0xFFFF, messages.RESUME)) + ask("SEQUENCE_STATE")
+    yield ask("SEQUENCE_CONTROL", (0xFFFF, sequences.RESUME)) + ask("SEQUENCE_STATE")
 
 
 @pytest.mark.usefixtures("micropython")
@@ -239,9 +240,9 @@ def test_a_sequence_is_played_the_same(name):
         board.to_device += next(requests, ALIVE)
         board.tick()
     assert_same(recorder.decided, replay(MicroPythonFirmware(board.data, BOOT_ID), recorder.given))
-    heard = list(wire.Reader(KEY).feed(b"".join(outputs.link for outputs in recorder.decided)))
+    heard = list(Reader(KEY).feed(b"".join(outputs.link for outputs in recorder.decided)))
     assert not [message for message in heard if message.id == messages.ERROR]
     events = [message for message in heard if message.id == messages.SEQUENCE_EVENT]
-    assert {event["reason"] for event in events} == {0, messages.BY_TIME, messages.BY_SETTLING, messages.BY_TIMEOUT}
-    assert events[-1]["event"] == messages.SEQUENCE_ENDED
+    assert {event["reason"] for event in events} == {0, sequences.BY_TIME, sequences.BY_SETTLING, sequences.BY_TIMEOUT}
+    assert events[-1]["event"] == sequences.SEQUENCE_ENDED
     assert len(events) == 4 + 6 + 4 + 2 + 1

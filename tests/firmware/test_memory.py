@@ -6,9 +6,11 @@ import zlib
 import pytest
 
 from bubble_firmware import boards
-from bubble_protocol import framing, messages, steps
+from bubble_protocol import steps
 from bubble_protocol.crc import crc32_into
-from bubbleskin.link import wire
+from bubble_protocol.frame import FRAME_MAX, HEADER, finish_frame, put_header
+from bubble_protocol.schema import messages, sequences
+from bubbleskin.link import message
 
 SCRIPT = """
 import gc, micropython
@@ -137,7 +139,7 @@ print(measure(app, hands), app.exceptions - exceptions, hands.safe)
 
 ACTIVE = ("SUBSCRIBE", "SHOW up", "STATE", "PING", "INFO", "SHOW down", "PING", "STATE", "INFO", "CLEAR")
 OUT_OF_ORDER = ("SUBSCRIBE", "SHOW up", "STATE", "INFO", "SHOW down", "STATE", "STOP ahead", "STATE")
-SAVING = ("FIGURES_WRITE", "STORE_SAVE", "FIGURES_READ", "FIGURES other", "STORE_SAVE", "STORE_INFO")
+SAVING = ("TRIM_WRITE", "STORE_SAVE", "TRIM_READ", "FIGURES other", "STORE_SAVE", "STORE_INFO")
 SEQUENCE = ("SEQUENCE_BEGIN", "SEQUENCE_WRITE", "SEQUENCE_ARM", "SEQUENCE_START", "SEQUENCE_STATE", *["PING"] * 20)
 SEQUENCE += (
     "SEQUENCE_CONTROL pause",
@@ -153,7 +155,7 @@ SEQUENCES = [
     pytest.param(("SUBSCRIBE_FIELDS", "SHOW up", "PING", "SHOW down", "INFO"), id="telemetry columns"),
     pytest.param(("TABLE_WRITE", "SHOW up", "STATE"), id="tables"),
     pytest.param(OUT_OF_ORDER, id="out of order, twice, overtaken"),
-    pytest.param(("STORE_INFO", "FIGURES_READ", "SHOW up", "STORE_SAVE", "FIGURES_WRITE"), id="store"),
+    pytest.param(("STORE_INFO", "TRIM_READ", "SHOW up", "STORE_SAVE", "TRIM_WRITE"), id="store"),
     pytest.param(SAVING, id="saving"),
     pytest.param(SEQUENCE, id="sequence"),
     pytest.param(("SEQUENCE_BEGIN stream", "SEQUENCE_WRITE stream", *SEQUENCE[1:5], "SHOW up"), id="sequences refused"),
@@ -167,17 +169,17 @@ SESSIONS = 17
 
 
 def request(name, n, number, session):
-    key = wire.session_key(1, session)
+    key = message.session_key(1, session)
     up = [(6000 + 900 * bubble % 8000,) for bubble in range(n)]
     down = [(13000 - 700 * bubble % 8000,) for bubble in range(n)]
 
     def of(what, *values):
-        return wire.encode(what, number, *values, key=key)
+        return message.encode(what, number, *values, key=key)
 
     def wrong_length():
-        frame = bytearray(framing.FRAME_MAX)
-        framing.put_header(frame, messages.SUBSCRIBE, number)
-        return bytes(frame[: framing.seal(frame, framing.HEADER + 1, crc32_into, key)])
+        frame = bytearray(FRAME_MAX)
+        put_header(frame, messages.SUBSCRIBE, number)
+        return bytes(frame[: finish_frame(frame, HEADER + 1, crc32_into, key)])
 
     requests = {
         "SHOW up": lambda: of("SHOW", (0,), up),
@@ -188,8 +190,8 @@ def request(name, n, number, session):
         "SUBSCRIBE_FIELDS": lambda: of("SUBSCRIBE_FIELDS", (2, 0b11100111 if n == 7 else 0b11100011)),
         "TABLE_READ": lambda: of("TABLE_READ", (1, 10)),
         "TABLE_WRITE": lambda: of("TABLE_WRITE", (1, 4, 60), [(9000, 65535)] * 40),
-        "FIGURES_WRITE": lambda: of("FIGURES_WRITE", (), [(170, 1100, 900, 4000)] * n),
-        "FIGURES other": lambda: of("FIGURES_WRITE", (), [(150, 1300, 1100, 3900)] * n),
+        "TRIM_WRITE": lambda: of("TRIM_WRITE", (), [(170, 1100, 900, 4000)] * n),
+        "FIGURES other": lambda: of("TRIM_WRITE", (), [(150, 1300, 1100, 3900)] * n),
         "garbage": lambda: bytes(range(1, 200)) + b"\0",
         "too high": lambda: of("SHOW", (0,), [(15000,)] * n),
         "wrong count": lambda: of("SHOW", (0,), [(9000,)] * (n + 1)),
@@ -206,9 +208,9 @@ def request(name, n, number, session):
         "SEQUENCE_WRITE": lambda: of("SEQUENCE_WRITE", (3, 0), program(n)),
         "SEQUENCE_ARM": lambda: of("SEQUENCE_ARM", (3,)),
         "SEQUENCE_START": lambda: of("SEQUENCE_START", (3, 0)),
-        "SEQUENCE_CONTROL pause": lambda: of("SEQUENCE_CONTROL", (3, messages.PAUSE)),
-        "SEQUENCE_CONTROL resume": lambda: of("SEQUENCE_CONTROL", (3, messages.RESUME)),
-        "SEQUENCE_CONTROL end": lambda: of("SEQUENCE_CONTROL", (3, messages.END)),
+        "SEQUENCE_CONTROL pause": lambda: of("SEQUENCE_CONTROL", (3, sequences.PAUSE)),
+        "SEQUENCE_CONTROL resume": lambda: of("SEQUENCE_CONTROL", (3, sequences.RESUME)),
+        "SEQUENCE_CONTROL end": lambda: of("SEQUENCE_CONTROL", (3, sequences.END)),
         "SEQUENCE_BEGIN stream": lambda: of("SEQUENCE_BEGIN", (4, n, 0, 0, 0xFFFFFFFF)),
         "SEQUENCE_WRITE stream": lambda: of("SEQUENCE_WRITE", (4, 0), program(n)),
     }

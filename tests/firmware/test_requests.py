@@ -5,10 +5,12 @@ import zlib
 import numpy as np
 import pytest
 
-from bubble_firmware import nominal
-from bubble_protocol import codec, framing, messages, version
+from bubble_firmware.control import nominal
+from bubble_protocol import codec, version
 from bubble_protocol.crc import crc32_into
-from bubbleskin.link import wire
+from bubble_protocol.frame import FRAME_MAX, HEADER, PAYLOAD_MAX, finish_frame, put_header
+from bubble_protocol.schema import errors, messages, system, telemetry
+from bubbleskin.link.message import encode
 
 WHOLE = 255  # the element of a refusal that is about no bubble or knot
 STEEPER = [(5000, 0), (8000, 20000), (14000, 40000)]
@@ -16,11 +18,11 @@ STEEPER = [(5000, 0), (8000, 20000), (14000, 40000)]
 
 def raw(rig, message_id, payload):
     """Send any payload under any id; the answer's (error, field, element, asked, low, high)."""
-    frame = bytearray(framing.FRAME_MAX)
+    frame = bytearray(FRAME_MAX)
     sequence = rig.next_sequence(message_id)
-    framing.put_header(frame, message_id, sequence)
+    put_header(frame, message_id, sequence)
     frame[4 : 4 + len(payload)] = payload
-    rig.hands.to_device += bytes(frame[: framing.seal(frame, framing.HEADER + len(payload), crc32_into, rig.key)])
+    rig.hands.to_device += bytes(frame[: finish_frame(frame, HEADER + len(payload), crc32_into, rig.key)])
     rig.heard()
     rig.tick()
     (answer,) = rig.heard()
@@ -51,7 +53,7 @@ def test_a_height_above_the_boards_limit_is_refused(rig):
     high = rig.board.HEIGHT_MAX_UM
     heights = [(high,)] * rig.board.BUBBLES
     heights[3] = (high + 1,)
-    assert rig.refused("SHOW", (0,), heights) == (messages.OUT_OF_RANGE, 1, 3, high + 1, 0, high)
+    assert rig.refused("SHOW", (0,), heights) == (errors.OUT_OF_RANGE, 1, 3, high + 1, 0, high)
 
 
 def test_the_greatest_and_the_least_height_are_not(rig):
@@ -64,14 +66,14 @@ def test_the_greatest_and_the_least_height_are_not(rig):
 @pytest.mark.usefixtures("unchanged")
 def test_a_time_above_the_schemas_limit_is_refused(rig):
     heights = [(9000,)] * rig.board.BUBBLES
-    assert rig.refused("SHOW", (60001,), heights) == (messages.OUT_OF_RANGE, 0, WHOLE, 60001, 0, 60000)
+    assert rig.refused("SHOW", (60001,), heights) == (errors.OUT_OF_RANGE, 0, WHOLE, 60001, 0, 60000)
 
 
 @pytest.mark.usefixtures("unchanged")
 def test_heights_for_another_number_of_bubbles_are_refused(rig):
     n = rig.board.BUBBLES
     for count in (0, 1, n - 1, n + 1, 122):
-        assert rig.refused("SHOW", (0,), [(9000,)] * count) == (messages.WRONG_COUNT, 1, WHOLE, count, n, n)
+        assert rig.refused("SHOW", (0,), [(9000,)] * count) == (errors.WRONG_COUNT, 1, WHOLE, count, n, n)
 
 
 # Anything.
@@ -81,7 +83,7 @@ def test_heights_for_another_number_of_bubbles_are_refused(rig):
 def test_an_unknown_message_is_refused(rig):
     known = {message[0] for message in messages.MESSAGES if message[0] | messages.REPLY in codec.BY_ID}
     for message_id in set(range(256)) - {request for request in known if request < messages.REPLY}:
-        assert raw(rig, message_id, b"12")[:4] == (messages.UNKNOWN_MESSAGE, 0, WHOLE, message_id)
+        assert raw(rig, message_id, b"12")[:4] == (errors.UNKNOWN_MESSAGE, 0, WHOLE, message_id)
 
 
 @pytest.mark.usefixtures("unchanged")
@@ -89,10 +91,10 @@ def test_a_payload_of_the_wrong_length_is_refused(rig):
     for message in codec.BY_ID.values():
         if message.id | messages.REPLY in codec.BY_ID and message.id < messages.REPLY:
             low = message.least
-            high = framing.PAYLOAD_MAX
+            high = PAYLOAD_MAX
             wrong = {low - 1, low + 1} if message.stride else {0, low - 1}
             for size in wrong & set(range(low)) | wrong & {low + 1}:
-                assert raw(rig, message.id, bytes(size)) == (messages.WRONG_LENGTH, 0, WHOLE, size, low, high)
+                assert raw(rig, message.id, bytes(size)) == (errors.WRONG_LENGTH, 0, WHOLE, size, low, high)
 
 
 def test_hello_introduces_the_board(rig):
@@ -113,7 +115,7 @@ def test_hello_introduces_the_board(rig):
         "height_max_um": board.HEIGHT_MAX_UM,
         "pressure_max_pa": board.PRESSURE_MAX_PA,
         "window": 8,
-        "capabilities": sum(bit for bit, _, _ in messages.CAPABILITIES),
+        "capabilities": sum(bit for bit, _, _ in system.CAPABILITIES),
         "tables_crc": zlib.crc32(np.array(nominal.KNOTS, "<u2").tobytes() * board.BUBBLES),
     }
 
@@ -121,8 +123,8 @@ def test_hello_introduces_the_board(rig):
 def test_a_host_of_another_protocol_is_refused(rig7):
     low, high = version.PROTOCOL_MIN, version.PROTOCOL_MAX
     newer, older = (high + 1, high + 5, 7), (0, low - 1, 7)
-    assert rig7.refused("HELLO", newer) == (messages.NO_COMMON_PROTOCOL, 1, WHOLE, high + 5, low, high)
-    assert rig7.refused("HELLO", older) == (messages.NO_COMMON_PROTOCOL, 1, WHOLE, low - 1, low, high)
+    assert rig7.refused("HELLO", newer) == (errors.NO_COMMON_PROTOCOL, 1, WHOLE, high + 5, low, high)
+    assert rig7.refused("HELLO", older) == (errors.NO_COMMON_PROTOCOL, 1, WHOLE, low - 1, low, high)
     assert rig7.ask("HELLO", (0, 255, 7)).id == messages.HELLO | messages.REPLY
 
 
@@ -133,7 +135,7 @@ def test_ping_gives_token_and_time_back(rig7):
 
 
 def test_info_counts(rig7):
-    rig7.hands.to_device += b"\x05abcd\0" + rig7.encode("PING", 1, (1,)) + wire.encode("PING", 1, (1,))
+    rig7.hands.to_device += b"\x05abcd\0" + rig7.encode("PING", 1, (1,)) + encode("PING", 1, (1,))
     rig7.tick()
     info = rig7.ask("INFO")
     assert (info["frames_good"], info["frames_bad"], info["exceptions"]) == (3, 2, 0), "without the key it is no frame"
@@ -188,7 +190,7 @@ def test_chosen_columns_say_the_same_as_the_state_of_that_tick(rig, fields):
     assert (sample["ticks"], sample["mode"], sample["fields"]) == (state["ticks"], state["mode"], fields)
     assert (sample["dropped"], sample["board_faults"]) == (0, 0)
     assert abs(sample["supply_pa"] - rig.board.SUPPLY_PA) < 100
-    chosen = [column for column in messages.COLUMNS if column[0] & fields]
+    chosen = [column for column in telemetry.COLUMNS if column[0] & fields]
     rows = sample.columns["value"].reshape(rig.board.BUBBLES, len(chosen))
     told = {
         "height": "height_um",
@@ -232,10 +234,10 @@ def test_the_columns_of_telemetry_are_of_the_row_they_name(rig7):
 
 @pytest.mark.usefixtures("unchanged")
 def test_more_columns_than_a_frame_has_room_for_are_refused(rig):
-    assert rig.refused("SUBSCRIBE_FIELDS", (4, 0))[:2] == (messages.OUT_OF_RANGE, 1)
-    assert rig.refused("SUBSCRIBE_FIELDS", (4, 256))[:2] == (messages.OUT_OF_RANGE, 1)
+    assert rig.refused("SUBSCRIBE_FIELDS", (4, 0))[:2] == (errors.OUT_OF_RANGE, 1)
+    assert rig.refused("SUBSCRIBE_FIELDS", (4, 256))[:2] == (errors.OUT_OF_RANGE, 1)
     if rig.board.BUBBLES == 19:
-        assert rig.refused("SUBSCRIBE_FIELDS", (4, 127))[:4] == (messages.OUT_OF_RANGE, 1, WHOLE, 127)
+        assert rig.refused("SUBSCRIBE_FIELDS", (4, 127))[:4] == (errors.OUT_OF_RANGE, 1, WHOLE, 127)
     else:
         assert rig.ask("SUBSCRIBE_FIELDS", (0, 255)).id == messages.SUBSCRIBE_FIELDS | messages.REPLY
 
@@ -254,7 +256,7 @@ def test_a_new_host_has_not_subscribed(rig7):
 
 @pytest.mark.usefixtures("unchanged")
 def test_a_period_above_the_limit_is_refused(rig):
-    assert rig.refused("SUBSCRIBE", (60001,)) == (messages.OUT_OF_RANGE, 0, WHOLE, 60001, 0, 60000)
+    assert rig.refused("SUBSCRIBE", (60001,)) == (errors.OUT_OF_RANGE, 0, WHOLE, 60001, 0, 60000)
 
 
 # Tables.
@@ -308,7 +310,7 @@ def test_tables_are_those_that_the_sdk_makes(rig7):
 def test_tables_with_another_crc_are_not_taken(rig):
     rig.write_table(1, STEEPER)
     crc = crc_of(nominal.KNOTS, STEEPER, *[nominal.KNOTS] * (rig.board.BUBBLES - 2))
-    assert rig.refused("TABLE_COMMIT", (crc ^ 1,))[:3] == (messages.BAD_CRC, 0, WHOLE)
+    assert rig.refused("TABLE_COMMIT", (crc ^ 1,))[:3] == (errors.BAD_CRC, 0, WHOLE)
 
 
 FLAWS = [
@@ -326,7 +328,7 @@ def test_a_table_with_a_flaw_is_not_taken(rig, table, knot):
     bubble = rig.board.BUBBLES - 1
     rig.write_table(bubble, table)
     right = crc_of(*[nominal.KNOTS] * bubble, table)
-    assert rig.refused("TABLE_COMMIT", (right,))[:3] == (messages.BAD_TABLE, 0, bubble)
+    assert rig.refused("TABLE_COMMIT", (right,))[:3] == (errors.BAD_TABLE, 0, bubble)
     assert rig.refused("TABLE_COMMIT", (right,))[3] == knot
 
 
@@ -334,7 +336,7 @@ def test_a_table_with_a_flaw_is_not_taken(rig, table, knot):
 def test_what_is_no_part_of_a_table_is_refused(rig):
     n = rig.board.BUBBLES
     knots = [(5000, 0)] * 10
-    out_of_range = messages.OUT_OF_RANGE
+    out_of_range = errors.OUT_OF_RANGE
     assert rig.refused("TABLE_WRITE", (n, 0, 10), knots) == (out_of_range, 0, WHOLE, n, 0, n - 1)
     assert rig.refused("TABLE_WRITE", (0, 64, 64), knots) == (out_of_range, 1, WHOLE, 64, 0, 63)
     assert rig.refused("TABLE_WRITE", (0, 0, 65), knots) == (out_of_range, 2, WHOLE, 65, 2, 64)
@@ -350,4 +352,4 @@ def test_no_knot_is_read_beyond_the_end(rig7):
     for bubble in range(7):
         rig7.write_table(bubble, STEEPER)
     rig7.ask("TABLE_COMMIT", (crc_of(*[STEEPER] * 7),))
-    assert rig7.refused("TABLE_READ", (0, 3)) == (messages.OUT_OF_RANGE, 1, WHOLE, 3, 0, 2)
+    assert rig7.refused("TABLE_READ", (0, 3)) == (errors.OUT_OF_RANGE, 1, WHOLE, 3, 0, 2)

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from bubble_protocol import messages
+from bubble_protocol.schema import errors, faults, messages, modes, statuses
 
 WRONG_READINGS = 2  # in a row that make a fault; one alone is noise
 HELD_PA, HELD_UM = 22609, 10008  # a knot of the nominal table
@@ -16,7 +16,7 @@ def hold(rig):
         rig.sense(bubble, HELD_PA)
     rig.show(HELD_UM)
     rig.tick(40)
-    assert set(rig.state()["status"]) == {messages.SETTLED}
+    assert set(rig.state()["status"]) == {statuses.SETTLED}
 
 
 def vented(rig, bubble):
@@ -27,26 +27,26 @@ def assert_isolated(rig, bubble, fault):
     """This bubble is vented for its fault, all others are controlled as before."""
     state = rig.state()
     assert state["faults"][bubble] & fault
-    assert state["status"][bubble] == messages.FAULT
+    assert state["status"][bubble] == statuses.FAULT
     assert vented(rig, bubble)
     others = [other for other in range(rig.board.BUBBLES) if other != bubble]
     assert not state["faults"][others].any()
-    assert set(state["status"][others]) == {messages.SETTLED}
+    assert set(state["status"][others]) == {statuses.SETTLED}
     assert not any(vented(rig, other) for other in others)
-    assert rig.app.mode == messages.ACTIVE
+    assert rig.app.mode == modes.ACTIVE
 
 
 WRONG = [
-    pytest.param(lambda rig: rig.board.PRESSURE_MAX_PA + 50, messages.OVERPRESSURE, id="overpressure"),
-    pytest.param(lambda rig: 0, messages.SENSOR_LOST, id="count 0"),
-    pytest.param(lambda rig: rig.board.COUNT_LOW, messages.SENSOR_LOST, id="lowest count"),
-    pytest.param(lambda rig: rig.board.COUNT_HIGH, messages.SENSOR_LOST, id="highest count"),
-    pytest.param(lambda rig: 4095, messages.SENSOR_LOST, id="count 4095"),
+    pytest.param(lambda rig: rig.board.PRESSURE_MAX_PA + 50, faults.OVERPRESSURE, id="overpressure"),
+    pytest.param(lambda rig: 0, faults.SENSOR_LOST, id="count 0"),
+    pytest.param(lambda rig: rig.board.COUNT_LOW, faults.SENSOR_LOST, id="lowest count"),
+    pytest.param(lambda rig: rig.board.COUNT_HIGH, faults.SENSOR_LOST, id="highest count"),
+    pytest.param(lambda rig: 4095, faults.SENSOR_LOST, id="count 4095"),
 ]
 
 
 def go_wrong(rig, bubble, wrong, fault):
-    if fault == messages.OVERPRESSURE:
+    if fault == faults.OVERPRESSURE:
         rig.sense(bubble, wrong(rig))
     else:
         rig.hands.counts[bubble] = wrong(rig)
@@ -127,7 +127,7 @@ def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
             rig.sense(0, 28300)  # what flows shows in the tube
         assert open_ticks * board.TICK_US <= board.FILL_MAX_US, "the valve is open for longer than allowed"
     assert open_ticks * board.TICK_US == board.FILL_MAX_US
-    assert_isolated(rig, 0, messages.VALVE_TIME)
+    assert_isolated(rig, 0, faults.VALVE_TIME)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -178,19 +178,19 @@ def test_stop_closes_and_vent_opens_all_valves(rig):
     rig.ask("STOP")
     rig.tick()  # decided in the tick after the request
     assert not any(rig.hands.pulses)
-    assert set(rig.state()["status"]) == {messages.STOPPED}
+    assert set(rig.state()["status"]) == {statuses.STOPPED}
     rig.ask("VENT")
     rig.tick()
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
-    assert set(rig.state()["status"]) == {messages.RESTING}
-    assert rig.app.mode == messages.MODE_VENTING
+    assert set(rig.state()["status"]) == {statuses.RESTING}
+    assert rig.app.mode == modes.VENTING
 
 
 def test_the_board_starts_vented(rig):
     assert rig.hands.in_vent
     rig.tick(3)
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
-    assert rig.app.mode == messages.IDLE
+    assert rig.app.mode == modes.IDLE
 
 
 # Exceptions.
@@ -202,7 +202,7 @@ def test_an_exception_in_the_tick_vents(rig, hand):
     rig.hands.broken.add(hand)
     rig.tick()
     assert rig.hands.in_vent
-    assert rig.app.mode == messages.MODE_VENTING
+    assert rig.app.mode == modes.VENTING
     assert rig.app.exceptions == 1
 
     rig.hands.broken.clear()
@@ -219,7 +219,7 @@ def test_a_board_that_fails_in_every_tick_still_answers(rig7, hand):
     rig7.show(12000)
     rig7.tick()
     assert rig7.hands.in_vent
-    assert rig7.app.mode == messages.MODE_VENTING
+    assert rig7.app.mode == modes.VENTING
 
 
 def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
@@ -229,13 +229,13 @@ def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
         raise MemoryError
 
     monkeypatch.setattr(rig7.app, "show", fail)
-    assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == messages.FAULTED
+    assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.FAULTED
     assert rig7.hands.in_vent
-    assert rig7.app.mode == messages.MODE_VENTING
+    assert rig7.app.mode == modes.VENTING
     assert rig7.ask("PING", (1,)).id == messages.PING | messages.REPLY
 
     # A failure later, with no request at hand, has nobody to be told to.
-    assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == messages.FAULTED
+    assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.FAULTED
     rig7.hands.broken |= {"sense", "receive"}
     rig7.tick(3)
     assert rig7.heard() == []
@@ -263,7 +263,7 @@ def test_a_broken_link_does_not_stop_the_tick(rig7, hand):
     rig7.hands.to_device = b""
     answer = rig7.ask("INFO")
     assert answer["exceptions"] >= 1
-    assert answer["mode"] == messages.MODE_VENTING
+    assert answer["mode"] == modes.VENTING
     assert answer["ticks"] == rig7.app.ticks
 
 
@@ -294,6 +294,6 @@ def test_an_exception_between_two_ticks_vents_too(rig7):
     rig7.hands.broken = {"receive"}
     rig7.app.listen()
     assert rig7.hands.in_vent
-    assert (rig7.app.mode, rig7.app.exceptions) == (messages.MODE_VENTING, 1)
+    assert (rig7.app.mode, rig7.app.exceptions) == (modes.VENTING, 1)
     rig7.hands.broken = set()
     assert rig7.ask("INFO")["exceptions"] == 1

@@ -6,9 +6,10 @@ import random
 import pytest
 
 import bubbleskin as bs
-from bubble_protocol import messages, steps
-from bubbleskin.records import Info
-from bubbleskin.shape.program import Program, check
+from bubble_protocol import steps
+from bubble_protocol.schema import errors, messages
+from bubbleskin.device.records import Info
+from bubbleskin.sequence.compile import Program, check
 
 EASINGS = ["linear", "smooth", "in", "out"]
 THEN = ["go on", "hold", "vent", "stop"]
@@ -141,7 +142,7 @@ def test_random_words_never_harm(seven):
                 if words[at] & 3 == steps.STEP:
                     assert all(word <= 14000 or word == 65535 for word in words[at + 4 : at + 11])
         else:
-            assert answer["error"] in (messages.BAD_STEP, messages.BAD_LOOP, messages.NO_ROOM)
+            assert answer["error"] in (errors.BAD_STEP, errors.BAD_LOOP, errors.NO_ROOM)
         seven.ask("SEQUENCE_ARM", 7)
         seven.ask("SEQUENCE_START", 7, 0)
         seven.tick(rng.randrange(3))

@@ -5,8 +5,9 @@ import zlib
 
 import pytest
 
-from bubble_protocol import codec, messages, steps
-from bubble_protocol.messages import (
+from bubble_protocol import codec, steps
+from bubble_protocol.schema import errors, faults, messages, modes, sequences
+from bubble_protocol.schema.sequences import (
     BY_SETTLING,
     BY_TIME,
     BY_TIMEOUT,
@@ -66,21 +67,21 @@ def test_a_start_at_a_tick(sequencer):
     at = sequencer.rig.app.ticks + 50
     assert sequencer.start(at) == at
     sequencer.tick(20)
-    assert sequencer.state()["state"] == messages.WAITING
-    assert sequencer.rig.app.mode in (messages.BOOT, messages.IDLE), "until then nothing happens"
+    assert sequencer.state()["state"] == sequences.WAITING
+    assert sequencer.rig.app.mode in (modes.BOOT, modes.IDLE), "until then nothing happens"
     sequencer.until_ended()
     assert sequencer.begun() == [at]
-    assert sequencer.rig.app.mode == messages.ACTIVE
+    assert sequencer.rig.app.mode == modes.ACTIVE
 
 
 def test_a_start_that_has_passed_is_refused(sequencer):
     sequencer.load(sequencer.all(9000, ramp=1000))
     now = sequencer.rig.app.ticks
-    assert sequencer.refusal("SEQUENCE_START", 7, now) == (messages.TOO_LATE, 1, WHOLE, now, now + 2, 0), (
+    assert sequencer.refusal("SEQUENCE_START", 7, now) == (errors.TOO_LATE, 1, WHOLE, now, now + 2, 0), (
         "it is heard in the next tick"
     )
-    assert sequencer.refusal("SEQUENCE_START", 7, 1)[0] == messages.TOO_LATE
-    assert sequencer.state()["state"] == messages.ARMED
+    assert sequencer.refusal("SEQUENCE_START", 7, 1)[0] == errors.TOO_LATE
+    assert sequencer.state()["state"] == sequences.ARMED
     soon = sequencer.rig.app.ticks + 2
     assert sequencer.start(soon) == soon
 
@@ -149,10 +150,10 @@ def test_no_step_settles_before_its_ramp_has_ended(seven):
 
 
 THEN = {
-    steps.GO_ON: (STEP_BEGUN, messages.ACTIVE),
-    steps.HOLD: (SEQUENCE_ENDED, messages.ACTIVE),
-    steps.VENT: (SEQUENCE_ENDED, messages.IDLE),
-    steps.STOP: (SEQUENCE_ENDED, messages.HOLDING),
+    steps.GO_ON: (STEP_BEGUN, modes.ACTIVE),
+    steps.HOLD: (SEQUENCE_ENDED, modes.ACTIVE),
+    steps.VENT: (SEQUENCE_ENDED, modes.IDLE),
+    steps.STOP: (SEQUENCE_ENDED, modes.HOLDING),
 }
 
 
@@ -233,10 +234,10 @@ def test_a_repeat_without_end_ends_when_it_is_stopped(seven):
     seven.play(seven.repeat(0), seven.all(6000, after=20), seven.all(7000, after=20), seven.end())
     seven.tick(800)
     assert len(seven.begun()) == 200
-    assert seven.ask("SEQUENCE_CONTROL", 7, messages.END).id == messages.SEQUENCE_CONTROL | messages.REPLY
+    assert seven.ask("SEQUENCE_CONTROL", 7, sequences.END).id == messages.SEQUENCE_CONTROL | messages.REPLY
     seven.tick()
     assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
-    assert seven.rig.app.mode == messages.HOLDING
+    assert seven.rig.app.mode == modes.HOLDING
 
 
 # Pause, and what ends a sequence.
@@ -245,15 +246,15 @@ def test_a_repeat_without_end_ends_when_it_is_stopped(seven):
 def test_pause_stops_time_and_setpoints(seven):
     start = seven.play(seven.all(12000, ramp=500), seven.all(6000, after=100))
     seven.tick(39)
-    seven.ask("SEQUENCE_CONTROL", 7, messages.PAUSE)
+    seven.ask("SEQUENCE_CONTROL", 7, sequences.PAUSE)
     still = seven.setpoints()
     assert still == pytest.approx([5000 + 7000 * 0.4] * 7, abs=3)
-    assert seven.state()["state"] == messages.PAUSED
+    assert seven.state()["state"] == sequences.PAUSED
     for _ in range(100):
         seven.tick()
         assert seven.setpoints() == still
-    seven.ask("SEQUENCE_CONTROL", 7, messages.PAUSE)  # twice is once
-    seven.ask("SEQUENCE_CONTROL", 7, messages.RESUME)
+    seven.ask("SEQUENCE_CONTROL", 7, sequences.PAUSE)  # twice is once
+    seven.ask("SEQUENCE_CONTROL", 7, sequences.RESUME)
     seven.tick()
     assert seven.setpoints() == pytest.approx([5000 + 7000 * 0.41] * 7, abs=3)
     seven.until_ended()
@@ -279,21 +280,21 @@ def test_an_emergency_stop_ends_it_and_forbids_another(seven):
     seven.load(seven.all(12000, ramp=500))
     seven.start()
     seven.tick(10)
-    seven.rig.hands.alarms = messages.ESTOP
+    seven.rig.hands.alarms = faults.ESTOP
     seven.tick(3)
     assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
-    assert seven.rig.app.mode == messages.MODE_STOPPED
+    assert seven.rig.app.mode == modes.STOPPED
     seven.ask("SEQUENCE_ARM", 7)
-    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == messages.BOARD_FAULT
+    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == errors.BOARD_FAULT
 
 
 def test_an_emergency_stop_before_the_start_forbids_it(seven):
     seven.load(seven.all(12000, ramp=500))
     seven.start(seven.rig.app.ticks + 50)
-    seven.rig.hands.alarms = messages.ESTOP
+    seven.rig.hands.alarms = faults.ESTOP
     seven.tick(100)
     assert seven.events == [(SEQUENCE_ENDED, CANCELLED, 0, seven.events[0][3])]
-    assert seven.rig.app.mode == messages.MODE_STOPPED
+    assert seven.rig.app.mode == modes.STOPPED
 
 
 def test_it_can_be_armed_and_played_again(seven):
@@ -315,7 +316,7 @@ def test_another_takes_over_where_the_bubbles_are(seven):
         seven.tick()
     seven.load(seven.all(6000, after=100))
     assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
-    assert seven.rig.app.mode == messages.ACTIVE
+    assert seven.rig.app.mode == modes.ACTIVE
     (held,) = set(seven.ask("STATE").columns["target_um"])
     assert 5000 < held < 12000, "neither where they came from nor where they went"
     seven.told.clear()
@@ -342,7 +343,7 @@ def test_a_stream_plays_on_while_it_is_written(sequencer):
         written += len(part)
     assert (
         sequencer.refusal("SEQUENCE_WRITE", 7, ring & 0xFFFF, repeated=[(w,) for w in records[ring]])[0]
-        == messages.NO_ROOM
+        == errors.NO_ROOM
     )
     sequencer.ask("SEQUENCE_ARM", 7)
     start = sequencer.start()
@@ -350,7 +351,7 @@ def test_a_stream_plays_on_while_it_is_written(sequencer):
         part = records[written : written + most]
         answer = sequencer.write(written, part)
         if answer.id == messages.ERROR:
-            assert answer["error"] == messages.NO_ROOM
+            assert answer["error"] == errors.NO_ROOM
             sequencer.tick(3)
         else:
             written += len(part)
@@ -371,14 +372,14 @@ def test_a_stream_that_runs_dry_is_held_and_says_so(seven):
     start = seven.start()
     seven.until_ended()
     assert seven.events[-1] == (SEQUENCE_ENDED, UNDERRUN, ring - 1, start + ring)
-    assert seven.rig.app.mode == messages.ACTIVE
+    assert seven.rig.app.mode == modes.ACTIVE
     assert seven.setpoints() == [6000 + ring - ring % 11] * 7
 
 
 def test_a_stream_has_no_repeats(seven):
     seven.begin(0)
     error = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in seven.repeat(2)])
-    assert error == (messages.BAD_LOOP, WHOLE, 0, 1, 0, 0)
+    assert error == (errors.BAD_LOOP, WHOLE, 0, 1, 0, 0)
 
 
 # Refused.
@@ -387,19 +388,19 @@ def test_a_stream_has_no_repeats(seven):
 def test_what_is_for_other_hardware_is_refused(sequencer):
     name = zlib.crc32(sequencer.rig.board.NAME.encode())
     assert sequencer.begin(3, board=name).id != messages.ERROR
-    assert sequencer.begin(3, board=name ^ 1)["error"] == messages.WRONG_BOARD
+    assert sequencer.begin(3, board=name ^ 1)["error"] == errors.WRONG_BOARD
     n = sequencer.n
-    assert sequencer.begin(3, board=name, bubbles=n + 1)["error"] == messages.WRONG_COUNT
-    assert sequencer.state()["state"] == messages.LOADING, "refused, so nothing has changed"
+    assert sequencer.begin(3, board=name, bubbles=n + 1)["error"] == errors.WRONG_COUNT
+    assert sequencer.state()["state"] == sequences.LOADING, "refused, so nothing has changed"
 
 
 BAD = [
-    ({"ramp": 60001}, messages.BAD_STEP, 1, 60001, 0, 60000),
-    ({"after": 60001}, messages.BAD_STEP, 2, 60001, 0, 60000),
-    ({"after": 4}, messages.BAD_STEP, 2, 4, 5, 60000),
-    ({"tolerance": 49, "timeout": 100}, messages.BAD_STEP, 3, 49, 50, 5000),
-    ({"tolerance": 5001, "timeout": 100}, messages.BAD_STEP, 3, 5001, 50, 5000),
-    ({"tolerance": 100, "timeout": 0}, messages.BAD_STEP, 2, 0, 5, 60000),
+    ({"ramp": 60001}, errors.BAD_STEP, 1, 60001, 0, 60000),
+    ({"after": 60001}, errors.BAD_STEP, 2, 60001, 0, 60000),
+    ({"after": 4}, errors.BAD_STEP, 2, 4, 5, 60000),
+    ({"tolerance": 49, "timeout": 100}, errors.BAD_STEP, 3, 49, 50, 5000),
+    ({"tolerance": 5001, "timeout": 100}, errors.BAD_STEP, 3, 5001, 50, 5000),
+    ({"tolerance": 100, "timeout": 0}, errors.BAD_STEP, 2, 0, 5, 60000),
 ]
 
 
@@ -420,7 +421,7 @@ def test_a_target_above_the_limit_is_refused(sequencer):
         bad[4 + 3] = um
         sequencer.begin(1)
         refused = sequencer.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in bad])
-        assert refused == (messages.BAD_STEP, 4 + 3, 0, um, 0, high)
+        assert refused == (errors.BAD_STEP, 4 + 3, 0, um, 0, high)
 
 
 def test_flags_that_mean_nothing_are_refused(seven):
@@ -428,8 +429,8 @@ def test_flags_that_mean_nothing_are_refused(seven):
         seven.begin(1)
         bad = [flags, 100, 100, 0, *[8000] * 7]
         assert seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in bad])[0] in (
-            messages.BAD_STEP,
-            messages.BAD_LOOP,
+            errors.BAD_STEP,
+            errors.BAD_LOOP,
         )
 
 
@@ -439,23 +440,23 @@ def test_repeats_that_do_not_fit_are_refused(seven):
     for records, where in (([end], 0), ([repeat, end], 1), ([repeat, one, end, end], 3), ([repeat] * 5, 4)):
         seven.begin(len(records))
         refused = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for r in records for w in r])
-        assert refused[:3] == (messages.BAD_LOOP, WHOLE, where)
+        assert refused[:3] == (errors.BAD_LOOP, WHOLE, where)
     seven.upload([repeat, one])
-    assert seven.refusal("SEQUENCE_ARM", 7)[0] == messages.NOT_READY, "one that is not ended"
+    assert seven.refusal("SEQUENCE_ARM", 7)[0] == errors.NOT_READY, "one that is not ended"
 
 
 def test_what_is_not_whole_or_not_that_is_not_armed(seven):
     one = seven.all(8000, after=50)
-    assert seven.refusal("SEQUENCE_ARM", 7) == (messages.NOT_READY, 0, WHOLE, messages.EMPTY, 0, 0)
-    assert seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in one])[0] == messages.NOT_READY
-    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == messages.NOT_READY
-    assert seven.refusal("SEQUENCE_CONTROL", 7, messages.PAUSE)[0] == messages.NOT_READY
+    assert seven.refusal("SEQUENCE_ARM", 7) == (errors.NOT_READY, 0, WHOLE, sequences.EMPTY, 0, 0)
+    assert seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in one])[0] == errors.NOT_READY
+    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == errors.NOT_READY
+    assert seven.refusal("SEQUENCE_CONTROL", 7, sequences.PAUSE)[0] == errors.NOT_READY
     seven.begin(3, crc=1)
     seven.write(0, [one, one])
-    assert seven.refusal("SEQUENCE_ARM", 7) == (messages.NOT_READY, 0, WHOLE, messages.LOADING, 2, 3)
-    assert seven.refusal("SEQUENCE_ARM", 8)[0] == messages.NOT_READY, "another one"
+    assert seven.refusal("SEQUENCE_ARM", 7) == (errors.NOT_READY, 0, WHOLE, sequences.LOADING, 2, 3)
+    assert seven.refusal("SEQUENCE_ARM", 8)[0] == errors.NOT_READY, "another one"
     assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(w,) for w in one]) == (
-        messages.OUT_OF_ORDER,
+        errors.OUT_OF_ORDER,
         1,
         WHOLE,
         3,
@@ -464,11 +465,11 @@ def test_what_is_not_whole_or_not_that_is_not_armed(seven):
     )
     seven.write(2, [one])
     assert seven.write(2, [one])["received"] == 3, "sent twice because the answer was lost"
-    assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(w,) for w in one])[:2] == (messages.NO_ROOM, 2)
-    assert seven.refusal("SEQUENCE_ARM", 7)[0] == messages.BAD_CRC
-    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == messages.NOT_READY
+    assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(w,) for w in one])[:2] == (errors.NO_ROOM, 2)
+    assert seven.refusal("SEQUENCE_ARM", 7)[0] == errors.BAD_CRC
+    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == errors.NOT_READY
     for count in (0, 1, 10, 12, 120):
-        assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(1,)] * count)[0] == messages.WRONG_LENGTH
+        assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(1,)] * count)[0] == errors.WRONG_LENGTH
 
 
 def test_an_upload_cut_half_way_is_forgotten_by_the_next(seven):

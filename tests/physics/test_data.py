@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import BadRowWarning, read_csv, simulate_sheet, write_csv
+from bubbleskin.membrane import BadRowWarning, read_csv, simulate_sheet, write_csv
 
 
 def written(tmp_path, text):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from bubbleskin.physics import YeohBalloon
-from bubbleskin.physics import wall as walls
+from bubbleskin.membrane import YeohBalloon
+from bubbleskin.membrane import wall as walls
 
 X = np.linspace(1.01, 4, 60)
 

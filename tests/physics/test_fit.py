@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import (
+from bubbleskin.membrane import (
     IdentifiabilityWarning,
     LackOfFitWarning,
     YeohBalloon,
@@ -17,7 +17,7 @@ from bubbleskin.physics import (
 )
 
 SHEETS = 200
-noisy = pytest.mark.filterwarnings("ignore::bubbleskin.physics.IdentifiabilityWarning")
+noisy = pytest.mark.filterwarnings("ignore::bubbleskin.membrane.IdentifiabilityWarning")
 
 
 def truth(balloon: YeohBalloon) -> np.ndarray:

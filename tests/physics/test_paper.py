@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from bubbleskin.physics import YeohBalloon
+from bubbleskin.membrane import YeohBalloon
 
 HEIGHTS_MM = np.arange(6, 15)
 PRESSURES_KPA = [17.857, 20.861, 21.297, 21.672, 22.600, 24.252, 26.691, 29.951, 34.064]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import Table, YeohBalloon, build_table, fit_sheet, fit_yeoh, simulate_sheet
+from bubbleskin.membrane import Table, YeohBalloon, build_table, fit_sheet, fit_yeoh, simulate_sheet
 from bubbleskin.plot import membrane
 
 

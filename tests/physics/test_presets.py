@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import PRESETS, YeohBalloon, preset
+from bubbleskin.membrane import PRESETS, YeohBalloon, preset
 
 # Engineering strain and stress (MPa) of Ecoflex 00-30: every tenth row or so, up to stretch 3, of "Ecoflex
 # 00-30.csv" in the Soft Robotics Materials Database (Marechal et al. 2021).

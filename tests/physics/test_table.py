@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import Table, YeohBalloon, build_table
+from bubbleskin.membrane import Table, YeohBalloon, build_table
 
 
 def exceeds(table: Table, balloon: YeohBalloon) -> float:

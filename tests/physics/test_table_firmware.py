@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bubble_firmware import table as firmware
-from bubbleskin.physics import Calibration, Table, YeohBalloon, build_table
+from bubble_firmware.control import table as firmware
+from bubbleskin.membrane import Calibration, Table, YeohBalloon, build_table
 
 
 def tables() -> list[Table]:
@@ -40,7 +40,7 @@ def test_micropython(micropython):
         expected.append(" ".join(map(str, table.pressure_at(h).tolist())))
     said = micropython(
         """
-        from bubble_firmware.table import pressure_at
+        from bubble_firmware.control.table import pressure_at
         import sys
         while True:
             line = sys.stdin.readline()

@@ -8,7 +8,7 @@ import pytest
 
 from bubbleskin.cli import membrane, plot
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics import Calibration, simulate_sheet, write_csv
+from bubbleskin.membrane import Calibration, simulate_sheet, write_csv
 
 ROOT = Path(__file__).parents[2]
 SHEET = str(ROOT / "docs/data/sheet.csv")

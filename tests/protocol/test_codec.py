@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_protocol import codec, messages
-from bubble_protocol.framing import PAYLOAD_MAX
+from bubble_protocol import codec
+from bubble_protocol.frame import PAYLOAD_MAX
+from bubble_protocol.schema import messages
 
 FORMATS = {
     messages.U8: "B",

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bubble_protocol.crc import crc32_into, crc32_word
-from bubbleskin.link import wire
+from bubbleskin.link import message
 
 crcmod_crc32 = crcmod.predefined.mkPredefinedCrcFun("crc-32")
 
@@ -19,7 +19,7 @@ def test_all_agree(data, before, after, at):
     buffer = bytearray(b"\x55" * before + data + b"\x55" * after)
     crc32_into(buffer, before, before + len(data), out, at)
     crc = int.from_bytes(out[at : at + 4], "little")
-    assert crc == zlib.crc32(data) == binascii.crc32(data) == crcmod_crc32(data) == wire.crc32(data)
+    assert crc == zlib.crc32(data) == binascii.crc32(data) == crcmod_crc32(data) == message.crc32(data)
     assert out[:at] + out[at + 4 :] == b"\xaa" * 5
     assert crc32_word(buffer, before, before + len(data)) == crc - (crc >> 31 << 32)
 

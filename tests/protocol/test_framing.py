@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bubble_protocol import framing
 from bubble_protocol.crc import crc32_into
+from bubble_protocol.frame import FRAME_MAX, HEADER, OVERHEAD, PAYLOAD_MAX, Decoder, finish_frame, put_header
 
 DIRTY = bytes(range(1, 256)) + b"\xff"  # what an earlier frame may have left in the buffer
 
@@ -15,18 +15,18 @@ ids = st.integers(0, 255)
 sequences = st.integers(0, 0xFFFF)
 # Zeros are what COBS is about: give them half of some payloads.
 payloads = st.one_of(
-    st.binary(max_size=framing.PAYLOAD_MAX),
-    st.lists(st.sampled_from([0, 0, 1, 255]), max_size=framing.PAYLOAD_MAX).map(bytes),
-    st.sampled_from([bytes(framing.PAYLOAD_MAX), b"\x01" * framing.PAYLOAD_MAX, b"\xff" * framing.PAYLOAD_MAX]),
+    st.binary(max_size=PAYLOAD_MAX),
+    st.lists(st.sampled_from([0, 0, 1, 255]), max_size=PAYLOAD_MAX).map(bytes),
+    st.sampled_from([bytes(PAYLOAD_MAX), b"\x01" * PAYLOAD_MAX, b"\xff" * PAYLOAD_MAX]),
 )
 messages = st.tuples(ids, sequences, payloads)
 
 
 def frame_of(message_id, sequence, payload):
     frame = bytearray(DIRTY)
-    framing.put_header(frame, message_id, sequence)
+    put_header(frame, message_id, sequence)
     frame[4 : 4 + len(payload)] = payload
-    return bytes(frame[: framing.seal(frame, framing.HEADER + len(payload), crc32_into)])
+    return bytes(frame[: finish_frame(frame, HEADER + len(payload), crc32_into)])
 
 
 def take(decoder, data):
@@ -42,7 +42,7 @@ def take(decoder, data):
 
 
 def fresh():
-    return framing.Decoder(crc32_into)
+    return Decoder(crc32_into)
 
 
 def cobs_decode(block):
@@ -80,7 +80,7 @@ def test_a_frame_is_cobs_around_header_payload_and_crc(message):
     content = cobs_decode(frame[:-1])
     assert content[:-4] == bytes([message_id]) + sequence.to_bytes(2, "little") + payload
     assert content[-4:] == zlib.crc32(content[:-4]).to_bytes(4, "little")
-    assert len(frame) - len(payload) == framing.OVERHEAD <= 9
+    assert len(frame) - len(payload) == OVERHEAD <= 9
 
 
 @given(messages, st.sampled_from([bytes, bytearray]))
@@ -165,8 +165,8 @@ def test_delimiters_alone_count_as_nothing():
 
 
 def test_the_shortest_and_the_longest_frame():
-    assert len(frame_of(1, 2, b"")) == framing.OVERHEAD
-    assert len(frame_of(1, 2, bytes(framing.PAYLOAD_MAX))) == framing.FRAME_MAX
+    assert len(frame_of(1, 2, b"")) == OVERHEAD
+    assert len(frame_of(1, 2, bytes(PAYLOAD_MAX))) == FRAME_MAX
     short = b"\x01\x02\x03"  # four bytes too few, with the CRC that would be theirs
     decoder = fresh()
     assert take(decoder, cobs_encode(short[:2] + zlib.crc32(short[:2]).to_bytes(4, "little")) + b"\0") == []

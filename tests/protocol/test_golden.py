@@ -12,7 +12,7 @@ import pytest
 
 from bubble_protocol import codec
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.link import wire
+from bubbleskin.link.message import SCHEMA_CRC, Reader, _signed, encode
 
 GOLDEN = json.loads((Path(__file__).parent / "golden.json").read_text(encoding="utf-8"))
 every_vector = pytest.mark.parametrize(
@@ -33,19 +33,19 @@ def test_every_message_is_there():
 
 
 def test_schema_and_version():
-    assert GOLDEN["schema_crc"] == wire.SCHEMA_CRC
+    assert GOLDEN["schema_crc"] == SCHEMA_CRC
     assert GOLDEN["protocol"] == [PROTOCOL_MIN, PROTOCOL_MAX]
 
 
 @every_vector
 def test_the_host_makes_the_frame(vector):
-    frame = wire.encode(vector["message"], vector["sequence"], fixed_values(vector), vector["repeated"])
+    frame = encode(vector["message"], vector["sequence"], fixed_values(vector), vector["repeated"])
     assert frame.hex() == vector["frame"]
 
 
 @every_vector
 def test_the_host_understands_the_frame(vector):
-    (message,) = wire.Reader().feed(bytes.fromhex(vector["frame"]))
+    (message,) = Reader().feed(bytes.fromhex(vector["frame"]))
     assert (message.id, message.sequence, message.fields) == (vector["id"], vector["sequence"], vector["fixed"])
     names = [field[0] for field in codec.BY_NAME[vector["message"]].repeated]
     assert list(message.columns) == names
@@ -56,7 +56,7 @@ def test_the_host_understands_the_frame(vector):
 def test_the_device_makes_and_understands_the_frames(micropython):
     lines = []
     for vector in GOLDEN["vectors"]:
-        values = array("i", map(wire._signed, [*fixed_values(vector), *chain(*vector["repeated"])]))
+        values = array("i", map(_signed, [*fixed_values(vector), *chain(*vector["repeated"])]))
         lines.append(
             " ".join(
                 [
@@ -72,7 +72,7 @@ def test_the_device_makes_and_understands_the_frames(micropython):
         """
         import sys
         from array import array
-        from bubble_protocol import codec, framing
+        from bubble_protocol import codec, frame as framing
         from bubble_protocol.crc import crc32_into, crc32_word
 
         decoder = framing.Decoder(crc32_into)
@@ -88,7 +88,7 @@ def test_the_device_makes_and_understands_the_frames(micropython):
 
             end = message.pack(values, count, out, framing.Decoder.PAYLOAD_AT)
             framing.put_header(out, message.id, sequence)
-            made = bytes(out[: framing.seal(out, end - 1, crc32_into)])
+            made = bytes(out[: framing.finish_frame(out, end - 1, crc32_into)])
 
             taken = decoder.feed(frame, 0, len(frame))
             back = array("i", bytearray(4 * len(values)))
@@ -107,4 +107,4 @@ def test_the_device_makes_and_understands_the_frames(micropython):
         """,
         stdin="\n".join(lines) + "\n",
     )
-    assert said.split() == [str(len(GOLDEN["vectors"])), str(wire._signed(GOLDEN["schema_crc"]))]
+    assert said.split() == [str(len(GOLDEN["vectors"])), str(_signed(GOLDEN["schema_crc"]))]

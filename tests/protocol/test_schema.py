@@ -3,11 +3,24 @@
 import pytest
 
 from bubble_firmware import boards
-from bubble_firmware.requests import _KNOTS_PER_MESSAGE
-from bubble_protocol import codec, messages, steps
-from bubble_protocol.framing import PAYLOAD_MAX
-from bubble_protocol.messages import I16, I32, MESSAGES, REPLY, TEXT, U8, U16, U32
-from bubbleskin.link import wire
+from bubble_firmware.handlers.requests import _KNOTS_PER_MESSAGE
+from bubble_protocol import codec, steps
+from bubble_protocol.frame import PAYLOAD_MAX
+from bubble_protocol.schema import (
+    errors,
+    faults,
+    messages,
+    modes,
+    self_test,
+    sequences,
+    settings,
+    statuses,
+    store,
+    system,
+    telemetry,
+)
+from bubble_protocol.schema.messages import I16, I32, MESSAGES, REPLY, TEXT, U8, U16, U32
+from bubbleskin.link.message import Message, describe_refusal
 from bubbleskin.sim.board import BOARDS
 
 RANGES = {
@@ -18,6 +31,7 @@ RANGES = {
     I32: (-(1 << 31), (1 << 31) - 1),
 }
 UNASKED = {messages.TELEMETRY, messages.TELEMETRY_FIELDS, messages.ERROR, messages.SEQUENCE_EVENT}
+NAMESPACES = (errors, faults, modes, self_test, sequences, settings, statuses, store, system)
 BUBBLES = 24  # the largest board a frame has room for
 
 FIELDS = [
@@ -85,8 +99,8 @@ def test_names_of_fields_are_unique_in_a_message():
         ("TELEMETRY", BUBBLES),
         ("TABLE_WRITE", 48),
         ("TABLE_READ_REPLY", 48),
-        ("FIGURES_WRITE", BUBBLES),
-        ("FIGURES_READ_REPLY", BUBBLES),
+        ("TRIM_WRITE", BUBBLES),
+        ("TRIM_READ_REPLY", BUBBLES),
         ("SEQUENCE_WRITE", steps.HEAD + BUBBLES),
     ],
 )
@@ -108,16 +122,16 @@ def test_telemetry_is_an_unasked_state():
 
 
 ENUMERATIONS = {
-    "modes": messages.MODES,
-    "statuses": messages.STATUSES,
-    "stores": messages.STORES,
-    "slots": messages.SLOTS,
-    "sequence states": messages.SEQUENCE_STATES,
-    "sequence reasons": messages.SEQUENCE_REASONS,
-    "sequence events": messages.SEQUENCE_EVENTS,
-    "sequence actions": messages.SEQUENCE_ACTIONS,
-    "settings": messages.SETTINGS,
-    "errors": messages.ERRORS,  # allotted in blocks
+    "modes": modes.MODES,
+    "statuses": statuses.STATUSES,
+    "stores": store.SOURCES,
+    "slots": store.SLOTS,
+    "sequence states": sequences.STATES,
+    "sequence reasons": sequences.REASONS,
+    "sequence events": sequences.EVENTS,
+    "sequence actions": sequences.ACTIONS,
+    "settings": settings.SETTINGS,
+    "errors": errors.ERRORS,  # allotted in blocks
 }
 
 
@@ -126,30 +140,31 @@ def test_an_enumeration_counts_on(table):
     first = table[0][0]
     assert first in (0, 1)
     numbers = [entry[0] for entry in table]
-    assert numbers == (sorted(set(numbers)) if table is messages.ERRORS else list(range(first, first + len(table))))
+    assert numbers == (sorted(set(numbers)) if table is errors.ERRORS else list(range(first, first + len(table))))
     assert len({entry[1] for entry in table}) == len(table)
     for number, name, *_, meaning in table:
-        constant = "NO_STORE" if name == "none" else name.upper().removesuffix("_MS")
-        # Three states have the names of other things.
-        assert number in (getattr(messages, constant, None), getattr(messages, f"MODE_{constant}", None))
+        constant = name.upper().removesuffix("_MS")
+        constant = {"NONE": "NO_STORE", "EMERGENCY_STOP": "ESTOP"}.get(constant, constant)
+        spaces = [vars(space) for space in NAMESPACES if table in vars(space).values()]
+        assert number in [space.get(prefix + constant) for space in spaces for prefix in ("", "SLOT_", "CAN_")]
         assert meaning
 
 
 def test_faults_are_bits_of_a_byte():
-    assert [fault[0] for fault in messages.FAULTS] == [1 << bit for bit in range(len(messages.FAULTS))]
-    assert messages.FAULTS[-1][0] <= 0x80
-    for bit, name, _ in messages.FAULTS:
-        assert getattr(messages, name.upper()) == bit
+    assert [fault[0] for fault in faults.FAULTS] == [1 << bit for bit in range(len(faults.FAULTS))]
+    assert faults.FAULTS[-1][0] <= 0x80
+    for bit, name, _ in faults.FAULTS:
+        assert getattr(faults, name.upper()) == bit
 
 
 def test_telemetry_columns_are_bits_of_the_field_that_chooses_them():
-    assert [column[0] for column in messages.COLUMNS] == [1 << bit for bit in range(len(messages.COLUMNS))]
+    assert [column[0] for column in telemetry.COLUMNS] == [1 << bit for bit in range(len(telemetry.COLUMNS))]
     (fields,) = [field for field in codec.BY_NAME["SUBSCRIBE_FIELDS"].fixed if field[0] == "fields"]
-    assert fields[4] == sum(column[0] for column in messages.COLUMNS)
+    assert fields[4] == sum(column[0] for column in telemetry.COLUMNS)
 
 
 def test_every_error_of_the_schema_can_be_explained():
-    for number, name, _ in messages.ERRORS:
+    for number, name, _ in errors.ERRORS:
         values = {
             "request": messages.SHOW,
             "error": number,
@@ -159,6 +174,6 @@ def test_every_error_of_the_schema_can_be_explained():
             "low": 0,
             "high": 14000,
         }
-        sentence = wire.explain(wire.Received(messages.ERROR, 0, values, {}))
+        sentence = describe_refusal(Message(messages.ERROR, 0, values, {}))
         # Another protocol is the session's to explain; everything else has a sentence of its own.
         assert ("with error" in sentence) == (name == "no_common_protocol")

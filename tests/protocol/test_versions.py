@@ -11,9 +11,11 @@ from pathlib import Path
 import pytest
 
 from bubble_firmware import boards
-from bubble_protocol import codec, framing, messages
+from bubble_protocol import codec
 from bubble_protocol.crc import crc32_into
-from bubbleskin.link import wire
+from bubble_protocol.frame import FRAME_MAX, Decoder, finish_frame
+from bubble_protocol.schema import messages
+from bubbleskin.link.message import Reader, session_key
 from bubbleskin.sim.board import InProcessFirmware
 
 RECORDED = sorted((Path(__file__).parent / "sessions").glob("*.json"))
@@ -26,7 +28,7 @@ def recorded(path):
 
 
 def read(recorded, key, side):
-    reader = wire.Reader(key)
+    reader = Reader(key)
     found = [message for tick in recorded["ticks"] for message in reader.feed(bytes.fromhex(tick[side]))]
     assert reader.bad == 0
     return found
@@ -34,7 +36,7 @@ def read(recorded, key, side):
 
 @every_version
 def test_todays_sdk_understands_the_devices_of_then(recorded):
-    key = wire.session_key(recorded["boot_id"], recorded["session"])
+    key = session_key(recorded["boot_id"], recorded["session"])
     received = read(recorded, key, "received")
     sent = read(recorded, key, "sent")
     answers = [message for message in received if message.id != messages.TELEMETRY]
@@ -49,8 +51,8 @@ def test_todays_firmware_answers_the_sdks_of_then_as_then(recorded):
     board = boards.load("wristband7")
     firmware = InProcessFirmware(board, recorded["boot_id"])
     counts = array("H", [board.SENSOR_ZERO] * board.BUBBLES + [2560])
-    key = wire.session_key(recorded["boot_id"], recorded["session"])
-    then, now = wire.Reader(key), wire.Reader(key)
+    key = session_key(recorded["boot_id"], recorded["session"])
+    then, now = Reader(key), Reader(key)
     changing = {"schema_crc", "firmware_major", "firmware_minor", "firmware_patch", "capabilities", "protocol_max"}
     for tick in recorded["ticks"]:
         link = firmware.tick(counts, bytes.fromhex(tick["sent"])).link
@@ -65,22 +67,22 @@ def test_todays_firmware_answers_the_sdks_of_then_as_then(recorded):
 
 def longer(frame, key):
     """The frame with six more bytes of payload, as a version sends it that has appended fields."""
-    decoder = framing.Decoder(crc32_into, key)
+    decoder = Decoder(crc32_into, key)
     decoder.feed(frame, 0, len(frame))
     message = codec.BY_ID.get(decoder.message_id)
     if message is None or message.stride:  # nothing can be appended behind a repeated group
         return frame
-    content = bytearray(framing.FRAME_MAX)
+    content = bytearray(FRAME_MAX)
     content[: 1 + decoder.length] = decoder.frame[: 1 + decoder.length]
     content[1 + decoder.length : 7 + decoder.length] = b"\xff\x01\x00\x02\xfe\x03"
-    return bytes(content[: framing.seal(content, decoder.length + 6, crc32_into, key)])
+    return bytes(content[: finish_frame(content, decoder.length + 6, crc32_into, key)])
 
 
 @every_version
 def test_fields_appended_by_newer_peers_are_ignored_by_both_ends(recorded):
     board = boards.load("wristband7")
     counts = array("H", [board.SENSOR_ZERO] * board.BUBBLES + [2560])
-    key = wire.session_key(recorded["boot_id"], recorded["session"])
+    key = session_key(recorded["boot_id"], recorded["session"])
     plain, newer = (InProcessFirmware(board, recorded["boot_id"]) for _ in range(2))
     for tick in recorded["ticks"]:
         frame = bytes.fromhex(tick["sent"])
@@ -88,6 +90,6 @@ def test_fields_appended_by_newer_peers_are_ignored_by_both_ends(recorded):
         # frames_good counts alike; whatever a newer host has appended, the answers are the same
         assert newer.tick(counts, longer(frame, key) if frame else b"").link == link
         for part in link.split(b"\0")[:-1]:
-            (one,) = wire.Reader(key).feed(part + b"\0")
-            (other,) = wire.Reader(key).feed(longer(part + b"\0", key))
+            (one,) = Reader(key).feed(part + b"\0")
+            (other,) = Reader(key).feed(longer(part + b"\0", key))
             assert one.fields == other.fields

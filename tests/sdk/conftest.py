@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import pytest
 
-from bubble_protocol import framing, messages
 from bubble_protocol.crc import crc32_into
+from bubble_protocol.frame import NO_KEY, Decoder, finish_frame
+from bubble_protocol.schema import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.link.session import drive
-from bubbleskin.link.wire import Reader, encode, session_key
+from bubbleskin.link.link import run_sync
+from bubbleskin.link.message import Reader, encode, session_key
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
 from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve
 from bubbleskin.skin import AsyncSkin, Skin
@@ -102,14 +103,14 @@ def greeting(request, low=PROTOCOL_MIN, high=PROTOCOL_MAX, board=b"wristband7", 
 
 def rekeyed(data, key):
     """Frames without a key, with this one."""
-    decoder = framing.Decoder(crc32_into)
+    decoder = Decoder(crc32_into)
     out = b""
     at = 0
     while at < len(data):
         at = decoder.feed(data, at, len(data))
         if decoder.length:
             frame = decoder.frame
-            out += bytes(frame[: framing.seal(frame, decoder.length, crc32_into, key)])
+            out += bytes(frame[: finish_frame(frame, decoder.length, crc32_into, key)])
     return out
 
 
@@ -127,7 +128,7 @@ class Scripted:
         self.closed = False
         self._answer = answer
         self._reader = Reader()
-        self._key = framing.NO_KEY
+        self._key = NO_KEY
         self._out = b""
         self._now = 0.0
 
@@ -212,7 +213,7 @@ def tapped():
         simulated = SimulatedBoard(board, seed=seed, spread=spread, contact=False)
         boards.append(simulated)
         tap = Tap(SimulatedTransport(simulated, board), **changes)
-        tap.skin = Skin(drive(AsyncSkin.open(tap, timeout, simulated=simulated)))
+        tap.skin = Skin(run_sync(AsyncSkin.open(tap, timeout, simulated=simulated)))
         return tap.skin, tap
 
     yield make

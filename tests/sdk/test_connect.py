@@ -15,11 +15,12 @@ import serial.rfc2217
 from serial.tools import list_ports
 
 import bubbleskin as bs
-from bubble_protocol import messages, version
-from bubble_protocol.framing import FRAME_MAX
-from bubbleskin.link.session import drive
+from bubble_protocol import version
+from bubble_protocol.frame import FRAME_MAX
+from bubble_protocol.schema import errors
+from bubbleskin.link.link import run_sync
+from bubbleskin.link.message import encode
 from bubbleskin.link.transport import USB_IDS
-from bubbleskin.link.wire import encode
 from bubbleskin.sim.serve import PtyEnd
 from bubbleskin.skin import AsyncSkin
 
@@ -215,7 +216,7 @@ def no_common(low, high):
 
 def of_protocol_1(request):
     """It does not know of sessions, and finds HELLO too long."""
-    return encode("ERROR", request.sequence, (1, messages.WRONG_LENGTH, 0, 255, 6, 2, 2))
+    return encode("ERROR", request.sequence, (1, errors.WRONG_LENGTH, 0, 255, 6, 2, 2))
 
 
 NOW = version.PROTOCOL_MAX
@@ -235,14 +236,14 @@ NOW = version.PROTOCOL_MAX
 )
 def test_a_version_or_a_board_that_does_not_fit(scripted, hello, answer, words):
     transport = scripted(answer if callable(answer) else lambda request: hello(request, **answer))
-    fails(bs.WrongDevice, *words, act=lambda: drive(AsyncSkin.open(transport, 2.0)))
+    fails(bs.WrongDevice, *words, act=lambda: run_sync(AsyncSkin.open(transport, 2.0)))
     assert transport.closed
     assert len(transport.requests) == 1
 
 
 def test_versions_that_overlap_fit(scripted, hello):
     transport = scripted(lambda request: hello(request, 0, 9))
-    assert drive(AsyncSkin.open(transport, 2.0)).info.protocol == (0, 9)
+    assert run_sync(AsyncSkin.open(transport, 2.0)).info.protocol == (0, 9)
 
 
 def test_a_version_mismatch_over_a_real_port(behaving):

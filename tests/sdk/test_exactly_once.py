@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 import bubbleskin as bs
-from bubble_protocol import messages
-from bubbleskin.link.session import Link, drive
-from bubbleskin.link.window import Request
-from bubbleskin.sim import FaultLink, Faults
+from bubble_protocol.schema import messages
+from bubbleskin.link.link import Link, run_sync
+from bubbleskin.link.send_window import Request
+from bubbleskin.sim import Faults, LossyTransport
 
-TOOLS = Path(__file__).parents[2] / "tools"
+TOOLS = Path(__file__).parents[2] / "tools/stress"
 
 
 def tool(name):
@@ -64,10 +64,10 @@ class ExactlyOnce(RuleBasedStateMachine):
     def begin(self, seed):
         self.device = soak.Device()
         faults = Faults(drop=0.2, duplicate=0.1, flip=0.05, reorder=0.1, truncate=0.05, split=0.1)
-        self.line = FaultLink(self.device, faults, seed=seed)
+        self.line = LossyTransport(self.device, faults, seed=seed)
         self.line.on = False
         self.link = Link(self.line, 1.0)
-        drive(self.link.hello())
+        run_sync(self.link.hello())
         self.requests = []
 
     @rule(count=st.integers(1, 12))
@@ -87,11 +87,11 @@ class ExactlyOnce(RuleBasedStateMachine):
     @rule()
     def call(self):
         with contextlib.suppress(bs.LinkError, bs.Overtaken):
-            drive(self.link.call("STATE"))
+            run_sync(self.link.call("STATE"))
 
     @rule(seconds=st.sampled_from([0.005, 0.02, 0.1, 0.5, 1.5]))
     def wait(self, seconds):
-        drive(self.link.wait(self.device.now() + seconds))
+        run_sync(self.link.wait(self.device.now() + seconds))
 
     @rule(on=st.booleans())
     def fail(self, on):
@@ -104,7 +104,7 @@ class ExactlyOnce(RuleBasedStateMachine):
     @rule()
     def another_session(self):
         try:
-            drive(self.link.hello())
+            run_sync(self.link.hello())
         except bs.WrongDevice:
             assert self.line.on, "nothing but the line can be in the way"
 
@@ -130,9 +130,9 @@ class ExactlyOnce(RuleBasedStateMachine):
         self.line.on = False
         for _ in range(3):
             self.call()
-        drive(self.link.wait(self.device.now() + 2.0))
+        run_sync(self.link.wait(self.device.now() + 2.0))
         assert all(request.done for request in self.requests if request.sends)
-        drive(self.link.call("STATE"))
+        run_sync(self.link.call("STATE"))
         self.exactly_once()
 
 

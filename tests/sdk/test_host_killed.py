@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubble_protocol import messages
+from bubble_protocol.schema import modes
 from bubbleskin.sim import SimulatedBoard
 from bubbleskin.sim.serve import PtyEnd, serve
 
@@ -29,10 +29,10 @@ def test_in_virtual_time_a_host_that_stops_is_noticed_to_the_tick():
         skin.show(np.full(7, 12.0), over=20.0, wait=False)
         board, tick = skin.simulated, skin.info.tick
         asked = board.time  # answered in the tick that has just passed
-        while board.firmware.app.mode == messages.ACTIVE:
+        while board.firmware.app.mode == modes.ACTIVE:
             board.tick()
         held = board.time - tick  # the tick that decided it began then
-        while board.firmware.app.mode == messages.HOLDING:
+        while board.firmware.app.mode == modes.HOLDING:
             board.tick()
         vented = board.time - tick
         assert held - asked == pytest.approx(0.25 - tick)
@@ -64,7 +64,7 @@ def test_a_killed_process_is_noticed():
         host = subprocess.Popen([sys.executable, "-c", HOST, end.name], stdout=subprocess.PIPE, text=True)
         try:
             assert host.stdout.readline() == "moving\n"
-            assert board.firmware.app.mode == messages.ACTIVE
+            assert board.firmware.app.mode == modes.ACTIVE
             host.send_signal(signal.SIGKILL)
             host.wait()
             killed = board.firmware.app.ticks

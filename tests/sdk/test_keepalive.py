@@ -40,7 +40,7 @@ def keepers():
 
 @pytest.mark.parametrize("event_loop", [False, True])
 def test_as_virtual_time_passes(event_loop):
-    from bubbleskin.link.session import drive
+    from bubbleskin.link.link import run_sync
     from bubbleskin.sim import SimulatedBoard, SimulatedTransport
     from bubbleskin.skin import AsyncSkin
 
@@ -57,7 +57,7 @@ def test_as_virtual_time_passes(event_loop):
     if event_loop:
         asyncio.run(script())
     else:
-        drive(script())
+        run_sync(script())
     assert len(line.times) > 60
     assert np.diff(line.times).max() <= GAP + TICK + 1e-9
     assert board.firmware.app.session.heard >= len(line.times) - 1

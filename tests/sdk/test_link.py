@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubble_protocol import messages
-from bubbleskin.link.session import Link, drive
-from bubbleskin.link.wire import encode
+from bubble_protocol.schema import messages
+from bubbleskin.link.link import Link, run_sync
+from bubbleskin.link.message import encode
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -113,11 +113,11 @@ def test_a_late_reply_answers_no_other_request(scripted):
 
     link = Link(scripted(answer), 1.0)
     for token in range(30):
-        assert drive(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
+        assert run_sync(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
     link._window._next = 0x10000
     for token in range(100, 129):
         late.clear()
-        assert drive(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
+        assert run_sync(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
 
 
 def test_the_answer_to_another_question_is_no_answer(scripted):
@@ -127,14 +127,14 @@ def test_the_answer_to_another_question_is_no_answer(scripted):
         )
 
     with pytest.raises(bs.DeviceSilent):
-        drive(Link(scripted(answer), 1.0).call("INFO"))
+        run_sync(Link(scripted(answer), 1.0).call("INFO"))
 
 
 def test_a_half_frame_on_the_line_does_not_spoil_the_greeting(tapped):
     skin, _ = tapped()
     skin.simulated.to_device += b"\x07half a frame"
     with pytest.raises(bs.DeviceRefused):  # the board is fine, only that frame was not
-        drive(skin._skin._link.call("SHOW", (0,), [(6000,)]))
+        run_sync(skin._skin._link.call("SHOW", (0,), [(6000,)]))
     skin, tap = tapped(change=lambda data: data)
     assert tap.sent[0] == 0, "the first byte ends whatever stood on the line"
 
@@ -187,7 +187,7 @@ def test_telemetry_that_a_device_forgot_is_asked_for_again(tapped):
     skin, tap = tapped(timeout=0.5)
     states = skin.telemetry(50)
     next(states)
-    drive(skin._skin._link.hello())
+    run_sync(skin._skin._link.hello())
     begin = tap.now()
     times = [next(states).time for _ in range(5)]
     assert tap.now() - begin < 1.0

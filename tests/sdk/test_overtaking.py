@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubbleskin.link.session import Link, drive
-from bubbleskin.sim import FaultLink, Faults, SimulatedBoard, SimulatedTransport
+from bubbleskin.link.link import Link, run_sync
+from bubbleskin.sim import Faults, LossyTransport, SimulatedBoard, SimulatedTransport
 from bubbleskin.skin import AsyncSkin
 
 pytestmark = pytest.mark.timeout(60)
@@ -30,7 +30,7 @@ def journal(board):
 def test_overtaken_or_applied_and_nothing_after(urgent, seed):
     board = SimulatedBoard("wristband7")
     applied = journal(board)
-    line = FaultLink(SimulatedTransport(board, "sim"), Faults(drop=0.2, reorder=0.1), seed=seed)
+    line = LossyTransport(SimulatedTransport(board, "sim"), Faults(drop=0.2, reorder=0.1), seed=seed)
 
     async def script():
         skin = await AsyncSkin.open(line, 2.0, event_loop=True)
@@ -64,7 +64,7 @@ def test_in_one_batch():
     link = Link(SimulatedTransport(board, "sim"), 2.0)
     show = ("SHOW", (0,), [(9000,)] * 7)
     with pytest.raises(bs.Overtaken, match="SHOW was overtaken by VENT; it was not applied"):
-        drive(link.calls([show, ("VENT", (), ()), ("SHOW", (0,), [(8000,)] * 7)]))
+        run_sync(link.calls([show, ("VENT", (), ()), ("SHOW", (0,), [(8000,)] * 7)]))
     assert applied == [8000]
 
 
@@ -73,7 +73,7 @@ def test_a_cancelled_call_leaves_no_gap(before):
     """Cancelled before it was sent it never is; after that it is seen through, so that the window stays open."""
     board = SimulatedBoard("wristband7")
     applied = journal(board)
-    line = FaultLink(SimulatedTransport(board, "sim"), Faults(drop=0.2), seed=before)
+    line = LossyTransport(SimulatedTransport(board, "sim"), Faults(drop=0.2), seed=before)
 
     async def script():
         skin = await AsyncSkin.open(line, 2.0, event_loop=True)

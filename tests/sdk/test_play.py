@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubble_protocol import messages
-from bubbleskin.link.session import drive
+from bubble_protocol.schema import faults, messages
+from bubbleskin.link.link import run_sync
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
 
@@ -81,7 +81,7 @@ def test_an_upload_cut_half_way_and_a_new_one(tapped):
     tap._change_sent = cut
     with pytest.raises(bs.LinkError):
         skin.play(bs.Sequence([bs.Step(UP, 0.1)] * 100))
-    again = Skin(drive(AsyncSkin.open(SimulatedTransport(board, "again"), 2.0, simulated=board)))
+    again = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, "again"), 2.0, simulated=board)))
     state = again.state()
     assert state.mode == "active", "what was shown still is"
     assert state.height_mm == pytest.approx(DOWN, abs=0.2)
@@ -168,7 +168,7 @@ def test_a_fault_of_the_board_is_named(tapped):
     skin, _ = tapped()
 
     def press(playing):
-        skin.simulated.firmware.alarms = messages.ESTOP
+        skin.simulated.firmware.alarms = faults.ESTOP
 
     with pytest.raises(bs.DeviceFault, match=r"ended in step 0 \(up\): faults of the board: emergency_stop"):
         skin.play(TWO, progress=press)
@@ -181,7 +181,7 @@ def test_playing_says_what_another_connection_started(tapped):
     assert skin.playing().state == "empty"
     skin.play(bs.Sequence([bs.Step(UP, 0.1)], loops=0), wait=False)
     board = skin.simulated
-    other = Skin(drive(AsyncSkin.open(SimulatedTransport(board, "other"), 2.0, simulated=board)))
+    other = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, "other"), 2.0, simulated=board)))
     assert other.playing().state == "playing"
     assert other.playing().step == -1, "it does not know the steps"
     other.pause()

@@ -185,7 +185,7 @@ def test_telemetry_goes_on_after_a_restart(cable, tmp_path):
 
 def test_another_program_takes_the_wristband(cable):
     """On a line that two can write to: the first is told so, and takes it back with its next call."""
-    from bubbleskin.link.wire import encode
+    from bubbleskin.link.message import encode
 
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
         with cable._lock:

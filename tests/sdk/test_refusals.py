@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubble_protocol import messages, version
-from bubbleskin.link import wire
-from bubbleskin.link.session import drive
+from bubble_protocol import version
+from bubble_protocol.schema import errors, messages
+from bubbleskin.link.link import run_sync
+from bubbleskin.link.message import Reader, encode
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -38,7 +39,7 @@ def skin(request):
 
 
 def call(skin, name, fixed=(), repeated=()):
-    return drive(skin._skin._link.call(name, fixed, repeated))
+    return run_sync(skin._skin._link.call(name, fixed, repeated))
 
 
 def refused(skin, sentence, name, fixed=(), repeated=()):
@@ -130,10 +131,10 @@ def test_what_only_a_device_says(skin, name):
 def test_a_host_that_speaks_no_common_protocol(skin):
     transport = skin._skin._link.transport
     newest = version.PROTOCOL_MAX
-    transport.write(wire.encode("HELLO", 999, (newest + 1, newest + 9, 1)))
-    (answer,) = wire.Reader().feed(transport.read(0.1))
+    transport.write(encode("HELLO", 999, (newest + 1, newest + 9, 1)))
+    (answer,) = Reader().feed(transport.read(0.1))
     assert (answer.id, answer.sequence, answer["request"]) == (messages.ERROR, 999, messages.HELLO)
-    assert (answer["error"], answer["low"], answer["high"]) == (messages.NO_COMMON_PROTOCOL, newest, newest)
+    assert (answer["error"], answer["low"], answer["high"]) == (errors.NO_COMMON_PROTOCOL, newest, newest)
 
 
 def test_a_height_of_zero_is_no_mistake(skin):

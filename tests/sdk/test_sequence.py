@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 
 import bubbleskin as bs
-from bubbleskin.shape.sequence import EASINGS, STEPS_MAX, THEN
-from bubbleskin.shape.sequence_files import SCHEMA
+from bubbleskin.sequence.files import SCHEMA
+from bubbleskin.sequence.model import EASINGS, STEPS_MAX, THEN
 
 N = 3
 SCHEMA_DATA = json.loads(SCHEMA.read_text(encoding="utf-8"))

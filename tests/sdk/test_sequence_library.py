@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubbleskin.shape.sequences import HIGH_MM, LIBRARY, LOW_MM, rings
+from bubbleskin.sequence.library import HIGH_MM, LIBRARY, LOW_MM, rings
 
 LAYOUTS = {
     "hexagon 7": bs.Layout.hexagon(1),

@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 
 import bubbleskin as bs
-from bubbleskin import columns
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.inbox import Inbox
-from bubbleskin.link.wire import Received
+from bubbleskin.link.message import Message
+from bubbleskin.telemetry.fields import NAMES, mask
 
 
 @pytest.fixture
@@ -65,9 +65,9 @@ def test_fields_that_there_are_not_are_refused(skin, fields):
 
 
 def test_no_more_fields_than_a_message_has_room_for():
-    assert columns.mask(columns.NAMES, 7) == 255
+    assert mask(NAMES, 7) == 255
     with pytest.raises(InvalidInput, match="1 to 6"):
-        columns.mask(columns.NAMES, 19)
+        mask(NAMES, 19)
 
 
 def test_gaps_are_counted_and_a_late_message_of_the_subscription_before_is_not():
@@ -76,17 +76,17 @@ def test_gaps_are_counted_and_a_late_message_of_the_subscription_before_is_not()
     inbox.listeners.append(lambda message, lost: heard.append(lost))
     inbox.begin()
     for sequence in (1, 2, 5, 5 + 0xFFF0, 6, 10):
-        inbox.append(Received(7, sequence & 0xFFFF, {}, {}))
+        inbox.append(Message(7, sequence & 0xFFFF, {}, {}))
     assert heard == [0, 0, 2, 2, 2, 5]
     inbox.begin()
-    inbox.append(Received(7, 3, {}, {}))
+    inbox.append(Message(7, 3, {}, {}))
     assert inbox.lost == 2
 
 
 def test_a_wrapped_sequence_number_is_no_gap():
     inbox = Inbox()
     for sequence in range(1, 70000):
-        inbox.append(Received(7, sequence & 0xFFFF, {}, {}))
+        inbox.append(Message(7, sequence & 0xFFFF, {}, {}))
     assert inbox.lost == 0
 
 

@@ -162,7 +162,7 @@ def test_what_never_comes_to_rest_is_said(model):
 
 
 def test_strict_raises(monkeypatch, model):
-    monkeypatch.setattr("bubbleskin.shape.path.LIMIT", 1)
+    monkeypatch.setattr("bubbleskin.contact.continuation.LIMIT", 1)
     assert not model.settle([ALL]).converged
     with pytest.raises(NoEquilibrium, match="more increments"):
         model.settle([ALL], strict=True)

@@ -5,9 +5,9 @@ import pytest
 import sympy
 
 import bubbleskin as bs
-from bubbleskin.shape import energy as core
-from bubbleskin.shape.path import Walker
-from bubbleskin.shape.relax import CONVERGED, relax
+from bubbleskin.contact import energy as core
+from bubbleskin.contact.continuation import PathFollower
+from bubbleskin.contact.relax import CONVERGED, relax
 
 BALLOONS = {
     "the paper's": bs.YeohBalloon(),
@@ -54,7 +54,7 @@ def test_gradient_is_that_of_the_energy(model):
 def test_curvature_is_that_of_the_gradient(model):
     rng = np.random.default_rng(2)
     state, pressure = crowded(model, rng)
-    walker = Walker(model.bubbles, model.springs, state)
+    walker = PathFollower(model.bubbles, model.springs, state)
     walker.reach(10e-3)
     blocks, contacts = np.empty((7, 4, 4)), np.empty((len(walker.pairs), 5))
     core.curvature(state, pressure, model.bubbles, walker.springs, walker.pairs, blocks, contacts)
@@ -107,7 +107,7 @@ def test_energy_never_rises_along_a_relaxation(model):
     rng = np.random.default_rng(3)
     for _ in range(20):
         state, pressure = crowded(model, rng)
-        walker = Walker(model.bubbles, model.springs, state)
+        walker = PathFollower(model.bubbles, model.springs, state)
         walker.reach(12e-3)
         trace = np.empty(401)
         ended, force, steps, _ = relax(
@@ -124,7 +124,7 @@ def test_plant_needs_only_the_mechanics():
     """What `mechanics` leaves out is air against membrane, along R alone."""
     model = bs.CompliantContact(bs.Layout.hexagon(1))
     state, pressure = crowded(model, np.random.default_rng(4))
-    walker = Walker(model.bubbles, model.springs, state)
+    walker = PathFollower(model.bubbles, model.springs, state)
     walker.reach(10e-3)
     g = np.zeros((7, 4))
     core.mechanics(state, model.bubbles, walker.springs, walker.pairs, g)

@@ -7,7 +7,7 @@ import pytest
 
 import bubbleskin as bs
 from bubbleskin.errors import InvalidInput
-from bubbleskin.shape.inverse import correct, pairs, steps_of, triples
+from bubbleskin.planner.inverse import correct, pairs, steps_of, triples
 
 P = 26.69e3
 ALL = np.full(7, P)

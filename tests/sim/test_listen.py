@@ -2,9 +2,10 @@
 
 import pytest
 
-from bubble_protocol import framing, messages
+from bubble_protocol import frame
+from bubble_protocol.schema import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.link import wire
+from bubbleskin.link.message import Reader, encode, session_key
 from bubbleskin.sim.board import SimulatedBoard, load_board
 from bubbleskin.sim.micropython import MicroPythonFirmware
 
@@ -24,18 +25,18 @@ class Host:
 
     def __init__(self, board):
         self.board = board
-        self._reader = wire.Reader()
-        self._key = framing.NO_KEY
+        self._reader = Reader()
+        self._key = frame.NO_KEY
         for _ in range(2):
             board.tick()
         self.say("HELLO", 1, (PROTOCOL_MIN, PROTOCOL_MAX, SESSION))
         board.tick()
         (reply,) = self.heard()
-        self._key = wire.session_key(reply["boot_id"], SESSION)
+        self._key = session_key(reply["boot_id"], SESSION)
         self._reader.use(self._key)
 
     def say(self, name, sequence, fixed, repeated=()):
-        self.board.to_device += wire.encode(name, sequence, fixed, repeated, self._key)
+        self.board.to_device += encode(name, sequence, fixed, repeated, self._key)
 
     def heard(self):
         found = list(self._reader.feed(bytes(self.board.from_device)))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics.balloon import ATMOSPHERE, yeoh_pressure
+from bubbleskin.membrane.balloon import ATMOSPHERE, yeoh_pressure
 from bubbleskin.sim.plant import Plant, PlantParameters, Supply
 from bubbleskin.sim.pneumatics import RESTRICTOR, orifice_flow
 

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from bubbleskin.physics.balloon import ATMOSPHERE
+from bubbleskin.membrane.balloon import ATMOSPHERE
 from bubbleskin.sim import pneumatics as pn
 
 LINE = 160e3  # absolute, about the supply

@@ -8,11 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from bubble_firmware import boards, figures, record
-from bubble_firmware.bubbles import Bubbles
-from bubble_firmware.figures import Figures
-from bubble_firmware.store import Store
-from bubble_firmware.table import KNOTS_MAX, Tables
+from bubble_firmware import boards
+from bubble_firmware.control import trim
+from bubble_firmware.control.bubbles import Bubbles
+from bubble_firmware.control.table import KNOTS_MAX, Tables
+from bubble_firmware.control.trim import Trim
+from bubble_firmware.store import record
+from bubble_firmware.store.slots import Store
 from bubbleskin.sim.flash import NorFlash
 
 
@@ -47,7 +49,7 @@ class Device:
         self.board = data or board(bubbles=1)
         self.tables = Tables(self.board.BUBBLES)
         self.bubbles = Bubbles(self.board, self.tables)
-        self.figures = Figures(self.board, self.bubbles)
+        self.figures = Trim(self.board, self.bubbles)
         if settings:
             self.settings = Settings()
         self.store = Store(self, flash)
@@ -75,7 +77,7 @@ class Device:
             self.tables.knots[4 * KNOTS_MAX * bubble :][: 4 * size].hex()
             for bubble, size in enumerate(self.tables.sizes)
         ]
-        found = array("i", bytes(4 * figures.COUNT * self.board.BUBBLES))
+        found = array("i", bytes(4 * trim.COUNT * self.board.BUBBLES))
         self.figures.read(found)
         settings = self.settings.values.tolist() if hasattr(self, "settings") else []
         return tuple(tables), tuple(found), tuple(settings)

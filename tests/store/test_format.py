@@ -5,9 +5,9 @@ import zlib
 
 import pytest
 
-from bubble_firmware import record
 from bubble_firmware.drivers.flash import Files
-from bubble_protocol import messages
+from bubble_firmware.store import record
+from bubble_protocol.schema import errors, store
 from bubbleskin.sim.flash import PAGE, SECTOR, NorFlash
 
 PRICE = {"wristband7": 1911, "wristband19": 5091}  # bytes without settings, as docs/store.md has them
@@ -48,13 +48,13 @@ def test_the_newer_one_is_used_over_the_wrap(kit, first, second, newer):
     slots = [some_record(kit, 10, first), some_record(kit, 20, second)]
     device = kit.Device(kit.flash_with(slots[0][1], slots[1][1]))
     assert device.content == slots[newer][0]
-    assert device.store.source == messages.SLOT_A + newer
+    assert device.store.source == store.SLOT_A + newer
     assert device.store.generation == (first, second)[newer]
 
 
 def test_nothing_stored_is_factory(kit):
     device = kit.Device(NorFlash())
-    assert device.store.source == messages.FACTORY
+    assert device.store.source == store.FACTORY
     assert device.content == kit.FACTORY_CONTENT
 
 
@@ -68,29 +68,29 @@ def test_a_bit_lost_anywhere_is_noticed(kit, good):
                 flash.image[slot * flash.size // 2 + bit // 8] ^= 1 << bit % 8
         device = kit.Device(flash)
         assert device.content == {0: one, 1: two, None: kit.FACTORY_CONTENT}[good]
-        assert device.store.source == {0: messages.SLOT_A, 1: messages.SLOT_B, None: messages.DAMAGED}[good]
+        assert device.store.source == {0: store.SLOT_A, 1: store.SLOT_B, None: store.DAMAGED}[good]
         device.change(30)
         assert device.store.save()
         if good is not None:
-            assert kit.Device(flash).store.states[good] == messages.WHOLE, "the good one has not been touched"
+            assert kit.Device(flash).store.states[good] == store.SLOT_VALID, "the good one has not been touched"
 
 
 def test_a_newer_schema_is_left_alone_until_a_reset(kit):
     old, older = some_record(kit, 10, 1)
     _, newer = some_record(kit, 20, 2, schema=record.SCHEMA + 1)
     for flash, source, content in (
-        (kit.flash_with(older, newer), messages.SLOT_A, old),
-        (kit.flash_with(newer), messages.FOREIGN, kit.FACTORY_CONTENT),
+        (kit.flash_with(older, newer), store.SLOT_A, old),
+        (kit.flash_with(newer), store.FOREIGN, kit.FACTORY_CONTENT),
     ):
         before = bytes(flash.image)
         device = kit.Device(flash)
         assert (device.store.source, device.content) == (source, content)
         device.change(30)
         assert not device.store.save()
-        assert device.store.error == messages.STORE_FOREIGN
+        assert device.store.error == errors.STORE_FOREIGN
         assert flash.image == before
         assert device.store.reset()
-        assert kit.Device(flash).store.source == messages.FACTORY
+        assert kit.Device(flash).store.source == store.FACTORY
         device.change(30)
         assert device.store.save()
 
@@ -98,7 +98,7 @@ def test_a_newer_schema_is_left_alone_until_a_reset(kit):
 def test_another_boards_record_is_left_alone(kit):
     _, other = some_record(kit, 10, 1, name="wristband19")
     device = kit.Device(kit.flash_with(b"", other))
-    assert device.store.source == messages.FOREIGN
+    assert device.store.source == store.FOREIGN
     assert device.content == kit.FACTORY_CONTENT
     assert not device.store.save()
 
@@ -121,7 +121,7 @@ def test_an_older_schema_lacks_what_has_been_added_since(kit):
         flash = kit.flash_with(kit.make_record(sections, 9, schema=record.SCHEMA - 1))
         device = kit.Device(flash)
         assert device.content == expected
-        assert device.store.source == messages.SLOT_A
+        assert device.store.source == store.SLOT_A
         assert device.store.save(), "and is written anew in today's schema"
         again = kit.Device(flash)
         assert (again.content, again.store.schema, again.store.generation) == (expected, record.SCHEMA, 10)
@@ -143,11 +143,11 @@ def test_what_the_board_does_not_allow_is_not_used(kit):
     ):
         newer = kit.make_record(kit.sections_of(unfit).values(), 2)
         alone = kit.Device(kit.flash_with(newer))
-        assert (alone.store.source, alone.content) == (messages.DAMAGED, kit.FACTORY_CONTENT)
-        assert alone.store.states[0] == messages.UNFIT
+        assert (alone.store.source, alone.content) == (store.DAMAGED, kit.FACTORY_CONTENT)
+        assert alone.store.states[0] == store.SLOT_REJECTED
         flash = kit.flash_with(older, newer)
         both = kit.Device(flash)
-        assert (both.store.source, both.content) == (messages.SLOT_A, (tables, figures, settings))
+        assert (both.store.source, both.content) == (store.SLOT_A, (tables, figures, settings))
         last = both.change(30)
         assert both.store.save()
         assert (kit.Device(flash).content, kit.Device(flash).store.generation) == (last, 3)
@@ -163,13 +163,13 @@ def test_sections_that_lie_about_their_length_are_not_used(kit):
         b"\x01\0\x01\x00\x40",
     ):
         device = kit.Device(kit.flash_with(kit.make_record((data,), 1)))
-        assert (device.store.source, device.content) == (messages.DAMAGED, kit.FACTORY_CONTENT)
+        assert (device.store.source, device.content) == (store.DAMAGED, kit.FACTORY_CONTENT)
     # A length beyond the slot, and one below a header, each with CRCs that fit.
     for length in (0, 43, 100_000, 0xFFFFFFFF):
         whole = kit.make_record(sections.values(), 1)
         head = whole[:8] + struct.pack("<I", length) + whole[12:36]
         head += struct.pack("<I", zlib.crc32(head))
-        assert kit.Device(kit.flash_with(head + whole[40:])).store.source == messages.DAMAGED
+        assert kit.Device(kit.flash_with(head + whole[40:])).store.source == store.DAMAGED
 
 
 def test_what_is_saved_already_is_not_written_again(kit):
@@ -207,16 +207,16 @@ def test_flash_that_does_not_take_it_is_told(kit):
     assert device.store.save()
     device.change(60)
     assert not device.store.save()
-    assert device.store.error == messages.STORE_FAILED
+    assert device.store.error == errors.STORE_FAILED
     assert kit.Device(flash).content == old
 
 
 def test_without_flash_there_is_no_store(kit):
     device = kit.Device(None)
-    assert device.store.source == messages.NO_STORE
+    assert device.store.source == store.NO_STORE
     assert not device.store.save()
     assert not device.store.reset()
-    assert device.store.error == messages.STORE_FAILED
+    assert device.store.error == errors.STORE_FAILED
 
 
 def test_files_do_as_well(kit, tmp_path, monkeypatch):
@@ -226,7 +226,7 @@ def test_files_do_as_well(kit, tmp_path, monkeypatch):
     for number in range(1, 5):
         for flash in (Files(lambda: calls.append(1)), chip):
             device = kit.Device(flash)
-            assert device.store.source == (messages.FACTORY if number == 1 else messages.SLOT_A + number % 2)
+            assert device.store.source == (store.FACTORY if number == 1 else store.SLOT_A + number % 2)
             content = device.change(number)
             assert device.store.save()
             assert kit.Device(flash).content == content

@@ -9,11 +9,11 @@ SCRIPT = """
 from array import array
 
 from bubble_firmware import boards
-from bubble_firmware.bubbles import Bubbles
+from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.drivers.flash import Memory
-from bubble_firmware.figures import Figures
-from bubble_firmware.store import Store
-from bubble_firmware.table import Tables
+from bubble_firmware.control.trim import Trim
+from bubble_firmware.store.slots import Store
+from bubble_firmware.control.table import Tables
 
 
 class Settings:
@@ -36,7 +36,7 @@ class Device:
         self.board = boards.load({board!r})
         self.tables = Tables(self.board.BUBBLES)
         self.bubbles = Bubbles(self.board, self.tables)
-        self.figures = Figures(self.board, self.bubbles)
+        self.figures = Trim(self.board, self.bubbles)
         self.settings = Settings()
         self.store = Store(self, flash)
 

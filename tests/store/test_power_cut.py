@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from bubble_protocol import messages
+from bubble_protocol.schema import store
 from bubbleskin.sim.flash import PAGE, SECTOR, NorFlash, PowerCut
 
 # Operations are issued one by one by one thread, each waits until the chip is done, and the chip does one at a time: what
@@ -204,4 +204,4 @@ def test_until_the_last_page_there_is_nothing_that_looks_like_a_record(kit):
         torn.cut(number, bytes_of(0, 0))
         with pytest.raises(PowerCut):
             save(device)
-        assert kit.Device(torn, data).store.states[0] == messages.BLANK
+        assert kit.Device(torn, data).store.states[0] == store.SLOT_BLANK

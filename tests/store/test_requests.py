@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubble_protocol import codec, messages
-from bubbleskin.link.session import drive
+from bubble_protocol import codec
+from bubble_protocol.schema import system
+from bubbleskin.link.link import run_sync
 from bubbleskin.sim import SimulatedBoard
 from bubbleskin.sim.flash import NorFlash, PowerCut
 from bubbleskin.sim.transport import SimulatedTransport
@@ -16,7 +17,7 @@ from bubbleskin.skin import AsyncSkin
 
 def open_board(**options):
     board = SimulatedBoard(**options)
-    return bs.Skin(drive(AsyncSkin.open(SimulatedTransport(board, "sim://wristband7"), 2.0, simulated=board)))
+    return bs.Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, "sim://wristband7"), 2.0, simulated=board)))
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def test_what_is_saved_is_there_after_a_power_cut_and_what_is_not_is_not(skin):
     assert skin.read_tables() == factory
     lose_power(skin)
     assert skin.read_tables() == factory
-    assert (skin.health().store, skin.stored().slots) == ("factory", ("whole", "whole"))
+    assert (skin.health().store, skin.stored().slots) == ("factory", ("valid", "valid"))
 
 
 def test_power_may_fail_while_the_host_waits():
@@ -100,7 +101,7 @@ def test_both_slots_bad_is_said():
         flash.image[slot * flash.size // 2 + 60] ^= 4
     lose_power(skin)
     assert skin.health().store == skin.stored().source == "damaged"
-    assert skin.stored().slots == ("torn", "torn")
+    assert skin.stored().slots == ("corrupt", "corrupt")
     assert skin.read_tables() == factory
     skin.save()
     assert skin.health().store == "slot_a"
@@ -168,4 +169,4 @@ def test_a_store_in_a_file_outlives_the_program(tmp_path):
 def test_the_capability_is_announced():
     hello = codec.BY_NAME["HELLO_REPLY"]
     assert "capabilities" in [field[0] for field in hello.fixed]
-    assert "store" in [name for bit, name, _ in messages.CAPABILITIES if bit == messages.STORE]
+    assert "store" in [name for bit, name, _ in system.CAPABILITIES if bit == system.STORE]

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 
-from bubble_protocol import messages
+from bubble_protocol.schema import store
 from bubbleskin.sim.flash import NorFlash, PowerCut
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -45,7 +45,7 @@ def machine(kit):
             self.device = kit.Device(self.flash)
             found = self.device.content
             assert found in allowed
-            assert self.device.store.source != messages.FOREIGN
+            assert self.device.store.source != store.FOREIGN
             return found
 
         def take(self, content):
@@ -105,14 +105,14 @@ def machine(kit):
         @precondition(lambda self: self.device.store.length)
         @rule(seed=SEEDS, bits=st.integers(1, 3))
         def rot_in_use(self, seed, bits):
-            self.rot(self.device.store.source == messages.SLOT_B, seed, bits)
+            self.rot(self.device.store.source == store.SLOT_B, seed, bits)
             self.stored = self.boot(*self.second)
             self.second = [kit.FACTORY_CONTENT]
 
-        @precondition(lambda self: self.device.store.source in (messages.SLOT_A, messages.SLOT_B))
+        @precondition(lambda self: self.device.store.source in (store.SLOT_A, store.SLOT_B))
         @rule(seed=SEEDS, bits=st.integers(1, 3))
         def rot_of_the_other(self, seed, bits):
-            self.rot(self.device.store.source == messages.SLOT_A, seed, bits)
+            self.rot(self.device.store.source == store.SLOT_A, seed, bits)
             self.boot(self.stored)
             self.second = [*self.second, kit.FACTORY_CONTENT]
 

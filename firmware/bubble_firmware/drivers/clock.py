@@ -1,6 +1,6 @@
 """A clock for other chips on GPOUT0, GPIO 21 (RP2040 datasheet, 2.15.7): the system clock divided by n/256."""
 
-from bubble_protocol.portable import const, micropython, ptr32
+from bubble_protocol.mpy_compat import const, micropython, ptr32
 
 CLOCKS = 0x40008000
 

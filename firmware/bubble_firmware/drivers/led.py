@@ -1,7 +1,7 @@
 # mypy: disable-error-code="valid-type,index,operator,arg-type"
 """The status LED, on a GPIO that `machine.Pin` has set up (RP2040 datasheet, 2.3.1: GPIO_OUT_SET and _CLR)."""
 
-from bubble_protocol.portable import const, micropython, ptr32
+from bubble_protocol.mpy_compat import const, micropython, ptr32
 
 _SET = const(5)
 _CLEAR = const(6)

@@ -13,7 +13,7 @@ which `machine.SPI` and `machine.Pin` have set up: `registers` and `gpio` are th
 objects that stand for them.
 """
 
-from bubble_protocol.portable import const, micropython, ptr16, ptr32
+from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
 
 SPI0 = 0x4003C000
 SIO = 0xD0000000

@@ -13,8 +13,8 @@ a fill output is on from count 0 to its width, a vent output, inverted, from its
 `bus` is a `machine.I2C`: `writeto`, `readfrom_into`. It raises OSError when a chip does not answer.
 """
 
-from bubble_protocol.framing import copy
-from bubble_protocol.portable import const, micropython, ptr8, ptr16
+from bubble_protocol.frame import copy
+from bubble_protocol.mpy_compat import const, micropython, ptr8, ptr16
 
 _LED0 = 6
 _DIVIDE = 5  # clocks of EXTCLK per count: PRE_SCALE + 1

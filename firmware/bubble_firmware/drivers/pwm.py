@@ -11,7 +11,7 @@ is open without power, and CC is how long it is left so from the start of the pe
 `registers` is the block's address; a test passes a list.
 """
 
-from bubble_protocol.portable import const, micropython, ptr16, ptr32
+from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
 
 BASE = 0x40050000
 TIMER = 0x40054000

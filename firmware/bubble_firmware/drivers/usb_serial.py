@@ -17,8 +17,8 @@ import sys
 
 import micropython
 
-from bubble_protocol.framing import copy
-from bubble_protocol.portable import ptr32
+from bubble_protocol.frame import copy
+from bubble_protocol.mpy_compat import ptr32
 
 _BUFFER = 256  # CFG_TUD_CDC_TX_BUFSIZE
 _CHUNK = 63  # bytes read at once after the first

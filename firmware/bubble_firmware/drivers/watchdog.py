@@ -2,7 +2,7 @@
 
 import machine
 
-from bubble_protocol.portable import const, micropython, ptr32
+from bubble_protocol.mpy_compat import const, micropython, ptr32
 
 _CTRL = 0x40058000
 _CTRL_CLEAR = _CTRL + 0x3000  # the alias that clears bits

@@ -7,7 +7,7 @@ import numpy as np
 
 from bubbleskin.bench.rows import Row
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.link import wire
+from bubbleskin.link import message
 
 _ROUNDS = 250  # short ones: what else the machine does falls between some of them
 _EACH = 40
@@ -23,17 +23,17 @@ def rows() -> list[Row]:
         ("TELEMETRY of 19", "TELEMETRY", (123456, 1), [(8123, 21345, 8100, 2, 0)] * 19),
     ]
     for title, name, fixed, repeated in shapes:
-        reader = wire.Reader()
+        reader = message.Reader()
 
         def ours(
             name: str = name,
             fixed: tuple[int, ...] = fixed,
             repeated: list[tuple[int, ...]] = repeated,
-            reader: wire.Reader = reader,
+            reader: message.Reader = reader,
         ) -> None:
-            (_message,) = reader.feed(wire.encode(name, 1, fixed, repeated))
+            (_message,) = reader.feed(message.encode(name, 1, fixed, repeated))
 
-        payload = len(wire.encode(name, 1, fixed, repeated)) - 9
+        payload = len(message.encode(name, 1, fixed, repeated)) - 9
         theirs, their_name, their_payload = _mavlink(payload)
         mine, other = _in_turns(ours, theirs)
         found += [

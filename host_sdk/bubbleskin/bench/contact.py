@@ -6,10 +6,10 @@ from collections.abc import Callable
 import numpy as np
 
 from bubbleskin.bench.rows import Row
+from bubbleskin.contact.model import CompliantContact, Shape
 from bubbleskin.layout import Layout
-from bubbleskin.physics import YeohBalloon
-from bubbleskin.shape.contact import CompliantContact, Shape
-from bubbleskin.shape.plan import plan
+from bubbleskin.membrane import YeohBalloon
+from bubbleskin.planner.search import plan
 
 _REPEATS = 3  # the best of them counts: what else the machine does only makes it slower
 _SEED = 1

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The law of `bubble_firmware.control.step` once more, in ordinary floats: what `bubbleskin bench` holds it against.
+"""The law of `bubble_firmware.control.step.step` once more, in ordinary floats: what `bubbleskin bench` holds it against.
 
 It runs on CPython and, sent to the prompt of an emulated chip, as MicroPython's bytecode. The same readings give
 the same decisions but for rounding. Only what a healthy bubble goes through is here: no faults, no guards but the
@@ -214,7 +214,7 @@ class Bubble:
 
 
 class Bubbles:
-    """All bubbles, called as `bubble_firmware.bubbles.Bubbles` is; `curves` are lists of (height, air, pressure)."""
+    """All bubbles, called as `bubble_firmware.control.bubbles.Bubbles` is; `curves` are lists of (height, air, pressure)."""
 
     def __init__(self, board, curves):
         self.bubbles = [Bubble(board, Curve(knots)) for knots in curves]

@@ -11,9 +11,9 @@ import serial
 
 from bubbleskin.bench.rows import Row
 from bubbleskin.connect import connect
-from bubbleskin.interpreter import find_micropython
-from bubbleskin.link import wire
-from bubbleskin.link.session import drive
+from bubbleskin.link import message
+from bubbleskin.link.link import run_sync
+from bubbleskin.toolchain.interpreter import find_micropython
 
 _ROUNDS = 10
 _EACH = 200
@@ -131,7 +131,7 @@ def rows() -> list[Row]:
 
 
 def _echo(name: str) -> list[float]:
-    frame = wire.encode("SHOW", 1, (0,), [(8000,)] * 7)
+    frame = message.encode("SHOW", 1, (0,), [(8000,)] * 7)
     times = []
     with serial.Serial(name, timeout=1.0) as port:
         port.reset_input_buffer()
@@ -149,11 +149,11 @@ def _board(name: str) -> tuple[list[float], list[float]]:
         link = skin._skin._link
         for count in range(_EACH):
             begin = time.perf_counter()
-            drive(link.call("SHOW", (0,), [(8000 + count,)] * 7))
+            run_sync(link.call("SHOW", (0,), [(8000 + count,)] * 7))
             shows.append(time.perf_counter() - begin)
         for count in range(_EACH // 4):
             begin = time.perf_counter()
-            drive(link.call("PING", (count,)))
+            run_sync(link.call("PING", (count,)))
             pings.append(time.perf_counter() - begin)
         skin.vent()
     return shows, pings

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from bubbleskin.bench.rows import Row
-from bubbleskin.physics import YeohBalloon, build_table, fit_sheet, simulate_sheet
+from bubbleskin.membrane import YeohBalloon, build_table, fit_sheet, simulate_sheet
 
 _REPEATS = 3  # the best of them counts: what else the machine does only makes it slower
 _PRESSURES = 100_000

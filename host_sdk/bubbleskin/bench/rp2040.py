@@ -7,21 +7,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bubble_firmware import control
-from bubble_firmware.bubbles import Bubbles
-from bubble_firmware.table import Tables
+from bubble_firmware.control import step
+from bubble_firmware.control.bubbles import Bubbles
+from bubble_firmware.control.table import Tables
 from bubbleskin.bench import float_law
 from bubbleskin.bench.rows import Row
 from bubbleskin.bench.trace import Tick, record
-from bubbleskin.build.rp2040 import BARE, firmware
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.link.session import drive
+from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import load_board
 from bubbleskin.sim.rp2040 import open_chip
 from bubbleskin.sim.rp2040.chip import CLOCK_HZ, Chip
 from bubbleskin.sim.rp2040.prompt import Prompt
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.toolchain.rp2040 import BARE, firmware
 
 _US = CLOCK_HZ // 1_000_000  # cycles
 _PERIODS = {"wristband7": (2000, 40), "wristband19": (5000, 60)}  # µs, and the share of it that a tick may take, %
@@ -38,7 +38,8 @@ _SAME_UM = 50
 _HARNESS = """
 from array import array
 import binascii, machine, time
-from bubble_firmware import boards, bubbles, table
+from bubble_firmware import boards
+from bubble_firmware.control import bubbles, table
 data = boards.load({board!r})
 machine.mem32[0xE000E014] = 0xFFFFFF
 machine.mem32[0xE000E010] = 5
@@ -129,10 +130,10 @@ def curves(board: str) -> list[list[tuple[float, int, int]]]:
     bubbles = Bubbles(data, Tables(data.BUBBLES))
     found = []
     for i in range(data.BUBBLES):
-        first, last = (bubbles._rows[i * control.ROW + edge] // 4 for edge in (control.FIRST, control.LAST))
-        knots = range(first, last + 2 * control.KNOT, control.KNOT)
+        first, last = (bubbles._rows[i * step.ROW + edge] // 4 for edge in (step.FIRST, step.LAST))
+        knots = range(first, last + 2 * step.KNOT, step.KNOT)
         words = bubbles._curves
-        found.append([(words[k + control.H] / 16, words[k + control.A], words[k + control.P]) for k in knots])
+        found.append([(words[k + step.H] / 16, words[k + step.A], words[k + step.P]) for k in knots])
     return found
 
 
@@ -183,7 +184,7 @@ def load(name: str, seconds: float) -> Load:
     """Run `name` under load: telemetry at 50 Hz and a SHOW of another shape every 50 ms."""
     board = open_chip(name, firmware([name])[name])
     transport = SimulatedTransport(board, f"rp2040://{name}")
-    skin = Skin(drive(AsyncSkin.open(transport, 2.0)))
+    skin = Skin(run_sync(AsyncSkin.open(transport, 2.0)))
     rng = np.random.default_rng(1)
     n = len(skin.layout)
     skin.vent()

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from bubbleskin.bench.rows import Row
-from bubbleskin.link.session import drive
+from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
@@ -25,7 +25,7 @@ def rows() -> list[Row]:
 
 def _run(name: str, board_name: str, *, moving: bool, target: str) -> Row:
     board = SimulatedBoard(board_name, seed=1)
-    skin = Skin(drive(AsyncSkin.open(SimulatedTransport(board, board_name), 2.0)))
+    skin = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, board_name), 2.0)))
     rng = np.random.default_rng(1)
     skin.sleep(0.5)  # compiled, cached and warm
     begin, cpu = board.time, time.process_time()

@@ -10,9 +10,9 @@ from typing import Any
 import click
 from rich.console import Console
 
-from bubbleskin.build.rp2040 import BOARDS
 from bubbleskin.cli.options import as_json
 from bubbleskin.errors import InvalidInput
+from bubbleskin.toolchain.rp2040 import BOARDS
 
 
 @click.group()
@@ -41,7 +41,7 @@ def build(boards: tuple[str, ...], micropython: Path | None, output: Path | None
     The first time takes minutes, a change of the firmware seconds, and no change nothing. Prints size, and, with
     the emulator installed, the heap that is free once the firmware runs on it.
     """
-    from bubbleskin.build.rp2040 import firmware as build_firmware
+    from bubbleskin.toolchain.rp2040 import firmware as build_firmware
 
     boards = boards or BOARDS
     if output and len(boards) != 1:
@@ -69,14 +69,14 @@ def build(boards: tuple[str, ...], micropython: Path | None, output: Path | None
 
 
 def _free_heap(board: str, uf2: Path) -> int:
-    from bubbleskin.link.session import drive
+    from bubbleskin.link.link import run_sync
     from bubbleskin.sim.rp2040 import open_chip
     from bubbleskin.sim.transport import SimulatedTransport
     from bubbleskin.skin import AsyncSkin, Skin
 
     chip: Any = open_chip(board, uf2)
     transport = SimulatedTransport(chip, f"rp2040://{board}")
-    with Skin(drive(AsyncSkin.open(transport, 2.0, simulated=chip))) as skin:
+    with Skin(run_sync(AsyncSkin.open(transport, 2.0, simulated=chip))) as skin:
         return skin.health().heap_free
 
 

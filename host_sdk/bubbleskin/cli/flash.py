@@ -8,9 +8,9 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from bubbleskin.build.rp2040 import BOARDS
 from bubbleskin.cli.options import as_json
 from bubbleskin.errors import InvalidInput
+from bubbleskin.toolchain.rp2040 import BOARDS
 
 
 @click.command()

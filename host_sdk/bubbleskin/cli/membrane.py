@@ -16,7 +16,7 @@ from bubbleskin.connect import connect
 from bubbleskin.errors import InvalidInput
 
 if TYPE_CHECKING:  # physics and plot load scipy and matplotlib, so a verb imports them when it runs
-    from bubbleskin.physics import Calibration, Measurements, SheetFit, YeohBalloon, YeohFit
+    from bubbleskin.membrane import Calibration, Measurements, SheetFit, YeohBalloon, YeohFit
 
 F = TypeVar("F", bound=Callable[..., Any])
 DATA = click.Path(dir_okay=False, path_type=Path)
@@ -117,7 +117,7 @@ def table(
 
     They come from a preset, from --data, from a file (--show) or from a wristband (--from-device).
     """
-    from bubbleskin.physics import Calibration
+    from bubbleskin.membrane import Calibration
 
     if save and not upload:
         raise InvalidInput("--save goes with --upload: it keeps the tables that are uploaded.")
@@ -180,7 +180,7 @@ def fit_file(
     wall: str,
 ) -> tuple[Measurements, YeohFit | SheetFit]:
     """Read a file of measurements and fit it as its options say."""
-    from bubbleskin.physics import fit_measurements, read_csv
+    from bubbleskin.membrane import fit_measurements, read_csv
 
     with _said():
         measurements = read_csv(data, skip_bad_rows=skip_bad_rows)
@@ -206,7 +206,7 @@ def balloon(
     **sizes: Any,
 ) -> YeohBalloon:
     """The balloon that material options describe."""
-    from bubbleskin.physics import YeohBalloon, preset
+    from bubbleskin.membrane import YeohBalloon, preset
 
     known = preset(name)
     if mu_kpa is None and c1_kpa is None:
@@ -223,7 +223,7 @@ def balloon(
 def _calibration(
     found: YeohFit | SheetFit | list[YeohBalloon], source: str, board: str, knots: int, up_to_mm: float
 ) -> Calibration:
-    from bubbleskin.physics import Calibration
+    from bubbleskin.membrane import Calibration
 
     balloons = found if isinstance(found, list) else found.balloons
     if not balloons:

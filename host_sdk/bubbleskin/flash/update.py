@@ -5,16 +5,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from bubbleskin.build.rp2040 import BOARDS, firmware
+from bubbleskin.device.records import Info
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError, WrongDevice
-from bubbleskin.flash import drive as drives
 from bubbleskin.flash import mpy, slots, uf2
+from bubbleskin.flash import run_sync as drives
 from bubbleskin.flash.kept import Kept, UnderWay
 from bubbleskin.flash.machine import Connection, Machine
 from bubbleskin.flash.prompt import Prompt
-from bubbleskin.link.session import drive as run
-from bubbleskin.records import Info
+from bubbleskin.link.link import run_sync as run
 from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.toolchain.rp2040 import BOARDS, firmware
 
 _HELLO_S = 1.5  # for one attempt
 _DRIVE_S = 20.0  # until the boot loader's drive is there and mounted
@@ -30,7 +30,7 @@ class Order:
 
     board: str | None = None
     device: str | None = None
-    drive: Path | None = None
+    run_sync: Path | None = None
     uf2: Path | None = None
     mpy: bool = False
     previous: bool = False
@@ -63,7 +63,7 @@ def flash(
     """
     if sum((order.uf2 is not None, order.mpy, order.previous)) > 1:
         raise InvalidInput("Say one of --uf2, --mpy and --previous, or none: then today's firmware is taken.")
-    if order.device and order.drive:
+    if order.device and order.run_sync:
         raise InvalidInput("Say --device for a board that runs, or --drive for one in its boot loader, not both.")
     return _Update(machine, order, report, build, files, kept).run()
 
@@ -92,11 +92,11 @@ class _Update:
         self.complaint = ""  # of the last HELLO
 
     def run(self) -> Outcome:
-        drive = self.find()
-        if drive is not None:
+        run_sync = self.find()
+        if run_sync is not None:
             if self.order.mpy:
                 raise InvalidInput("The board is in its boot loader, which takes a UF2 only: leave --mpy off.")
-            return self.by_uf2(drive)
+            return self.by_uf2(run_sync)
         self.report("asking the board", 0, 1)
         self.old = self.greet(_HELLO_S)
         if self.old:
@@ -113,9 +113,9 @@ class _Update:
         """The drive of the one board that is meant, or None with its port in `port`."""
         order, machine = self.order, self.machine
         ports, found = machine.ports(), machine.drives()
-        if order.drive:
+        if order.run_sync:
             self.others = set(ports)
-            return order.drive
+            return order.run_sync
         if order.device:
             self.port = order.device
             self.others = set(ports) - {order.device}
@@ -193,7 +193,7 @@ class _Update:
         until = self.machine.now() + _DRIVE_S
         while self.machine.now() < until:
             self.report("waiting for the boot loader's drive", 0, 1)
-            found = [drive for drive in self.machine.drives() if drive not in before]
+            found = [run_sync for run_sync in self.machine.drives() if run_sync not in before]
             if len(found) == 1:
                 return found[0]
             self.machine.sleep(_STEP_S)
@@ -227,8 +227,8 @@ class _Update:
             return uf2.read(path)
         return uf2.read(self.build(self.board()))
 
-    def by_uf2(self, drive: Path) -> Outcome:
-        drives.check(drive)
+    def by_uf2(self, run_sync: Path) -> Outcome:
+        drives.check(run_sync)
         image = self.image()
         board = self.board()
         kept = Kept(board, self.kept)
@@ -237,7 +237,7 @@ class _Update:
         )
         kept.tried(known)
         self.under_way.begin(board)
-        drives.copy(self.machine, drive, image, self.report)
+        drives.copy(self.machine, run_sync, image, self.report)
         back = (
             "; `bubbleskin flash --previous` then brings the last firmware back that worked" if kept.previous() else ""
         )

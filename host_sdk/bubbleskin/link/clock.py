@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubbleskin.errors import LinkError
-from bubbleskin.link.wire import Received
+from bubbleskin.link.message import Message
 
 WINDOW = 60.0
 """Seconds of round trips that are kept, before the newest."""
@@ -83,7 +83,7 @@ class Clock:
             device = self._unwrapped(device_ticks) * self._tick + phase_us * 1e-6
             self._keep(sent, received, device)
 
-    def hear(self, sent: float, reply: Received, received: float) -> None:
+    def hear(self, sent: float, reply: Message, received: float) -> None:
         """Take a PING's reply: what a link calls as its `on_ping`."""
         self.observe(sent, received, reply["ticks"], reply["phase_us"])
 

@@ -3,8 +3,8 @@
 from collections import deque
 from collections.abc import Callable
 
-from bubble_protocol import messages
-from bubbleskin.link.wire import Received
+from bubble_protocol.schema import messages
+from bubbleskin.link.message import Message
 
 UNASKED = (messages.TELEMETRY, messages.TELEMETRY_FIELDS)
 """Messages that answer no request."""
@@ -12,7 +12,7 @@ UNASKED = (messages.TELEMETRY, messages.TELEMETRY_FIELDS)
 _KEPT = 4096
 
 
-class Inbox(deque[Received]):
+class Inbox(deque[Message]):
     """The newest telemetry, oldest first. `listeners` are called with each message and `lost` as it comes.
 
     `lost` counts the messages that were due since `begin` and have not come: gaps in the sequence numbers, whether
@@ -21,7 +21,7 @@ class Inbox(deque[Received]):
 
     def __init__(self) -> None:
         super().__init__(maxlen=_KEPT)
-        self.listeners: list[Callable[[Received, int], None]] = []
+        self.listeners: list[Callable[[Message, int], None]] = []
         self.lost = 0
         self._sequence = 0
 
@@ -35,7 +35,7 @@ class Inbox(deque[Received]):
         """The same subscription anew, in another session: sequence numbers begin at 1, and what has come stays."""
         self._sequence = 0
 
-    def append(self, message: Received) -> None:
+    def append(self, message: Message) -> None:
         """Take one message."""
         gap = (message.sequence - self._sequence - 1) & 0xFFFF
         if gap < 0x8000:  # else one of a subscription that has ended, still on its way

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from bubbleskin.errors import LinkError
 
 if TYPE_CHECKING:
-    from bubbleskin.link.session import Link
+    from bubbleskin.link.link import Link
 
 _RETRY = 0.1
 

@@ -1,7 +1,7 @@
 """PING and its reply: the one request that has no turn, changes nothing and tells the time. No I/O, no clock."""
 
-from bubble_protocol import messages
-from bubbleskin.link import wire
+from bubble_protocol.schema import messages
+from bubbleskin.link.message import Message, encode
 
 _KEPT = 16
 
@@ -15,14 +15,14 @@ class Pings:
         self.unanswered = 0
         """How many have been sent since one was answered."""
         self._sent: dict[int, float] = {}  # when, by number
-        self._answers: dict[int, wire.Received] = {}
+        self._answers: dict[int, Message] = {}
 
     @property
     def waiting(self) -> bool:
         """Whether the last one has not been answered."""
         return self.number in self._sent
 
-    def answer(self, number: int) -> wire.Received | None:
+    def answer(self, number: int) -> Message | None:
         """The reply to PING `number`, where it has come."""
         return self._answers.get(number)
 
@@ -39,9 +39,9 @@ class Pings:
             self._sent.clear()
         self._sent[self.number] = now
         self.unanswered += 1
-        return wire.encode("PING", self.number, (token,), key=key)
+        return encode("PING", self.number, (token,), key=key)
 
-    def settle(self, message: wire.Received) -> float | None:
+    def settle(self, message: Message) -> float | None:
         """When the PING was sent that this replies to; None where there is none."""
         sent_at = self._sent.pop(message.sequence, None)
         if sent_at is None or message.id != messages.PING | messages.REPLY:

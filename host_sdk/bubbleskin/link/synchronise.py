@@ -1,7 +1,7 @@
 """Pings for a clock, a handful at once."""
 
 from bubbleskin.link.clock import Clock
-from bubbleskin.link.session import Link
+from bubbleskin.link.link import Link
 
 PINGS = 20
 _PAUSE = 1.3e-3  # seconds, and up to seven times that: not in step with the device's ticks

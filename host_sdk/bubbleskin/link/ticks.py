@@ -1,7 +1,7 @@
 """Device time beyond its wrap: a wristband counts ticks up to 2**30 and goes on from 0, after 62 days at 5 ms."""
 
-from bubble_protocol.messages import TICKS_WRAP
-from bubbleskin.link.wire import Received
+from bubble_protocol.schema.system import TICKS_WRAP
+from bubbleskin.link.message import Message
 
 
 class DeviceTicks:
@@ -10,7 +10,7 @@ class DeviceTicks:
     def __init__(self) -> None:
         self._latest: int | None = None
 
-    def unwrap(self, message: Received) -> None:
+    def unwrap(self, message: Message) -> None:
         """Replace the `ticks` of this message, where it has some, by those since boot or since the link was opened."""
         ticks = message.fields.get("ticks")
         if not isinstance(ticks, int):

@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
+from bubbleskin.contact.model import CompliantContact, Contact, Shape
 from bubbleskin.layout import Layout
 from bubbleskin.plot.membrane import COLOURS, STYLE
-from bubbleskin.shape.contact import CompliantContact, Contact, Shape
 
 if TYPE_CHECKING:
-    from bubbleskin.shape.plan import Plan
+    from bubbleskin.planner.search import Plan
 
 
 class Bubbles(Protocol):

@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics.balloon import YeohBalloon
-from bubbleskin.physics.data import Measurements
-from bubbleskin.physics.fit import HEIGHT_SD, PRESSURE_SD, YeohFit, fit_yeoh
-from bubbleskin.physics.sheet import SheetFit, fit_sheet
-from bubbleskin.physics.synthetic import simulate_sheet
-from bubbleskin.physics.table import HEIGHT_TOLERANCE, PRESSURE_TOLERANCE, Table
+from bubbleskin.membrane.balloon import YeohBalloon
+from bubbleskin.membrane.data import Measurements
+from bubbleskin.membrane.fit import HEIGHT_SD, PRESSURE_SD, YeohFit, fit_yeoh
+from bubbleskin.membrane.sheet import SheetFit, fit_sheet
+from bubbleskin.membrane.synthetic import simulate_sheet
+from bubbleskin.membrane.table import HEIGHT_TOLERANCE, PRESSURE_TOLERANCE, Table
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195")
 MARKERS = "osD^vP*"

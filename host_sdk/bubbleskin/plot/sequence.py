@@ -18,7 +18,7 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.plot.contact import colours, draw_above, draw_side
 from bubbleskin.plot.membrane import STYLE
-from bubbleskin.shape.sequence import Sequence as BubbleSequence
+from bubbleskin.sequence.model import Sequence as BubbleSequence
 from bubbleskin.skin import Skin
 
 _DPI = 80

@@ -8,9 +8,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from bubbleskin.device.records import Info, State
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import Clock
-from bubbleskin.records import Info, State
 
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 _HISTORY = 24

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from bubble_firmware import boards
 from bubble_firmware.app import App
+from bubbleskin.contact.model import CompliantContact
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.shape.contact import CompliantContact
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.plant import Plant, PlantParameters
 

@@ -36,7 +36,7 @@ class Faults:
                 raise InvalidInput(f"{field.name} is {value}; give {what}.")
 
 
-class FaultLink:
+class LossyTransport:
     """A `Transport` around another, with `faults` on it that `seed` decides.
 
     `reset()`: what restarts the device, such as `SimulatedBoard.reset`. `on`: whether faults happen now.

@@ -11,10 +11,10 @@ from dataclasses import fields
 import numpy as np
 from numba import njit
 
-from bubbleskin.physics import balloon
-from bubbleskin.physics.balloon import ATMOSPHERE
-from bubbleskin.shape import energy
-from bubbleskin.shape.energy import mechanics as _mechanics
+from bubbleskin.contact import energy
+from bubbleskin.contact.energy import mechanics as _mechanics
+from bubbleskin.membrane import balloon
+from bubbleskin.membrane.balloon import ATMOSPHERE
 from bubbleskin.sim import pneumatics
 from bubbleskin.sim.parameters import PlantParameters, Supply
 from bubbleskin.sim.pneumatics import OPEN_LINE

@@ -11,10 +11,10 @@ from types import ModuleType
 
 import bubble_firmware
 import bubble_protocol
-from bubble_firmware.boards.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
+from bubble_firmware.hal.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
 from bubbleskin.errors import LinkError
-from bubbleskin.interpreter import find_micropython
 from bubbleskin.sim.board import Outputs
+from bubbleskin.toolchain.interpreter import find_micropython
 
 HEAP = "448k"
 """What the firmware needs here: 116 kB of data (19 bubbles), as on the Pico, which has 237 kB for them. In this heap
@@ -36,7 +36,7 @@ def source_path() -> list[str]:
 
 
 class MicroPythonFirmware:
-    """A `Firmware` in another process, talked to through `bubble_firmware.boards.lockstep`."""
+    """A `Firmware` in another process, talked to through `bubble_firmware.hal.lockstep`."""
 
     def __init__(self, board: ModuleType, boot_id: int):
         interpreter = find_micropython()

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bubbleskin.contact.energy import BUBBLE, SPRINGS
 from bubbleskin.errors import InvalidInput
-from bubbleskin.physics.balloon import ATMOSPHERE, yeoh_pressure
-from bubbleskin.shape.energy import BUBBLE, SPRINGS
+from bubbleskin.membrane.balloon import ATMOSPHERE, yeoh_pressure
 from bubbleskin.sim import kernel
 from bubbleskin.sim.parameters import PlantParameters, Supply
 from bubbleskin.sim.pneumatics import sensor_counts
 
 if TYPE_CHECKING:
-    from bubbleskin.shape.contact import CompliantContact
+    from bubbleskin.contact.model import CompliantContact
 
 __all__ = ["Plant", "PlantParameters", "Supply"]
 

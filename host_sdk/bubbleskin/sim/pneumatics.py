@@ -7,7 +7,7 @@ scalars are compiled by `kernel.py`; here they stay Python.
 
 import math
 
-from bubbleskin.physics.balloon import ATMOSPHERE
+from bubbleskin.membrane.balloon import ATMOSPHERE
 
 REFERENCE_PRESSURE = 100e3
 """Absolute pressure at which ISO 6358 states a conductance (ANR), Pa."""

@@ -8,7 +8,7 @@ from typing import Protocol
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.link.transport import Transport
 from bubbleskin.sim.board import SimulatedBoard, load_board
-from bubbleskin.sim.faults import FaultLink, Faults
+from bubbleskin.sim.faults import Faults, LossyTransport
 from bubbleskin.sim.flash import NorFlash
 
 
@@ -154,7 +154,7 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transpo
     chosen = Options.parse(options, url)
     faults = Faults(drop=chosen.loss)  # refused before anything is started
     transport, board = _open(scheme, name, url, chosen)
-    return FaultLink(transport, faults, seed=chosen.seed) if chosen.loss else transport, board
+    return LossyTransport(transport, faults, seed=chosen.seed) if chosen.loss else transport, board
 
 
 def _open(scheme: str, name: str, url: str, chosen: Options) -> tuple[SimulatedTransport, Board]:

@@ -4,8 +4,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bubbleskin.build.rp2040 import built
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.rp2040 import built
 
 if TYPE_CHECKING:
     from bubbleskin.sim.rp2040.board import Rp2040Board

@@ -1,0 +1,1 @@
+"""What the device does when it is asked: a module for each group of requests."""

@@ -1,0 +1,1 @@
+"""Sequences on the device: their memory and what plays them."""

@@ -1,0 +1,1 @@
+"""What survives a power cut: two slots of flash, their records, the settings."""

@@ -1,0 +1,1 @@
+"""Bubbles that touch: energy, equilibrium, the path that is followed, the fit."""

@@ -1,0 +1,309 @@
+"""Bubbles that touch, as a user meets them: the paper's rigid rule and the compliant model, and the shapes they give."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bubbleskin.contact import energy as core
+from bubbleskin.contact.continuation import HALVINGS, MOVE, Outcome, PathFollower, Snap, ramps
+from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
+from bubbleskin.errors import InvalidInput, NoEquilibrium
+from bubbleskin.layout import Layout
+from bubbleskin.membrane import YeohBalloon
+from bubbleskin.membrane.balloon import ATMOSPHERE
+from bubbleskin.membrane.checks import finite, number, one_of, positive
+
+Array = NDArray[np.float64]
+Ramp = Literal["pressure", "height"]
+
+KZ, KXY, KC, KBASE = 10.0, 50.0, 300.0, 3000.0
+"""N/m. The preset: with these the model gives the paper's three heights (`tools/report/contact.py`)."""
+
+LINE_VOLUME = 0.2e-6
+"""m³ of air in valve node and tube of the simulated boards."""
+
+
+class Contact(NamedTuple):
+    """Two bubbles that push each other."""
+
+    first: int
+    second: int
+    force: float
+    """N, along the line between the centres."""
+    overlap_mm: float
+    """How far the spheres would reach into each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A settled array. Arrays have one entry per bubble, in layout order."""
+
+    height_mm: Array
+    """Top of each bubble above the base plane, z + R, (n,)."""
+    position: Array
+    """Centres x, y, z in m, (n, 3)."""
+    stretch: Array
+    """λ of the balloon's named surface, (n,)."""
+    contacts: tuple[Contact, ...]
+    pressure: Array
+    """Gauge, Pa, (n,)."""
+    radius: Array
+    """Outer radius R in m, (n,)."""
+    snaps: tuple[Snap, ...]
+    """What lost its stability on the way here."""
+    energy: float
+    """J, necks, base, contact, membranes and air."""
+    residual: float
+    """Largest force left, N."""
+    converged: bool
+    increments: int
+    """Relaxations on the way here, halved increments included."""
+
+    def __len__(self) -> int:
+        return len(self.height_mm)
+
+    @property
+    def lifted_mm(self) -> Array:
+        """How far each bubble's lowest point is off the base plane, (n,)."""
+        return np.asarray(1e3 * np.maximum(self.position[:, 2] - self.radius, 0.0))
+
+    @property
+    def state(self) -> Array:
+        """x, y, z, R of each bubble in m, (n, 4): what `energy.py` works on."""
+        return np.column_stack([self.position, self.radius])
+
+
+class CompliantContact:
+    """Elastic bubbles on soft necks that push each other: FACTS' energy, for any layout.
+
+    `balloon` is one for all or one per bubble. Springs in N/m: `kz` the neck upwards, `kxy` the neck sideways, `kc` the
+    contact of two bubbles, `kbase` the base plane. `kick` (m) is the size of the random nudges that find the stable
+    branch, `seed` theirs: the same calls give the same bytes. `increments` per step of `settle`, halved where needed.
+
+    Raises `InvalidInput` for figures that nothing has, and for two bubbles in one place.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        balloon: YeohBalloon | Sequence[YeohBalloon] | None = None,
+        *,
+        kz: float = KZ,
+        kxy: float = KXY,
+        kc: float = KC,
+        kbase: float = KBASE,
+        kick: float = 1e-7,
+        seed: int = 0,
+        increments: int = 25,
+    ) -> None:
+        self.layout = layout
+        self.balloons = balloons_of(balloon, layout)
+        for name, value in (("kz", kz), ("kxy", kxy), ("kc", kc), ("kbase", kbase)):
+            positive(name, number(name, value), "N/m")
+        self.kz, self.kxy, self.kc, self.kbase = float(kz), float(kxy), float(kc), float(kbase)
+        if increments < 1:
+            raise InvalidInput(f"A step is followed in 1 or more increments; {increments} were asked.")
+        self.kick, self.seed, self.increments = number("kick", kick), seed, int(increments)
+        self.bubbles = _records(layout, self.balloons)
+        gap = layout.positions_mm[:, None] - layout.positions_mm[None]
+        close = np.argwhere(np.triu(np.hypot(*gap.transpose(2, 0, 1)) < 1e-3, 1))
+        if len(close):
+            raise InvalidInput(
+                f"Bubbles {close[0][0]} and {close[0][1]} are in one place; the layout must keep them apart."
+            )
+
+    def __len__(self) -> int:
+        return len(self.layout)
+
+    @property
+    def springs(self) -> tuple[float, float, float, float]:
+        """`kz`, `kbase`, `kxy`, `kc`, as in `energy.SPRINGS`."""
+        return self.kz, self.kbase, self.kxy, self.kc
+
+    def rest(self) -> Shape:
+        """Every bubble without pressure."""
+        return self.settle(np.zeros((1, len(self))), increments=1)
+
+    def settle(
+        self,
+        steps: ArrayLike,
+        start: Shape | None = None,
+        *,
+        ramp: Ramp = "pressure",
+        increments: int | None = None,
+        move_mm: float = 1e3 * MOVE,
+        halvings: int = HALVINGS,
+        strict: bool = False,
+    ) -> Shape:
+        """Follow `steps`, (k, n) gauge pressures in Pa, one after the other from `start` (flat without one).
+
+        On the way to a step all pressures change in proportion; with `ramp="height"` the heights that the bubbles would
+        have alone do, as on a device. The result is where the bubbles are after the last step. An increment that moves
+        a bubble further than `move_mm` is halved, up to `halvings` times; where that does not help, it is a snap.
+
+        `Shape.converged` is False where no equilibrium was found, `residual` the force that is left then; with
+        `strict` that raises `NoEquilibrium`. Raises `InvalidInput` for pressures that no bubble holds.
+        """
+        targets = self._pressures(steps)
+        positive("move_mm", number("move_mm", move_mm), "mm")
+        one_of("ramp", ramp, ("pressure", "height"))
+        if start is not None and len(start) != len(self):
+            raise InvalidInput(f"The shape to start from has {len(start)} bubbles, the layout {len(self)}.")
+        begin = np.zeros(len(self)) if start is None else start.pressure
+        radii: list[Array] | None = None
+        if ramp == "height":
+            radii = [self.free_radius(begin, None if start is None else start.radius)]
+            for target in targets:
+                radii.append(self.free_radius(target, radii[-1]))
+        state = self._flat() if start is None else start.state
+        walker = PathFollower(
+            self.bubbles, self.springs, state, kick=self.kick, seed=self.seed, move=1e-3 * move_mm, halvings=halvings
+        )
+        path = ramps(begin, targets, None if radii is None else np.array(radii), self.bubbles)
+        for number_, pressures in enumerate(path):
+            walker.step(number_, pressures, self.increments if increments is None else increments)
+            if walker.ended != CONVERGED:
+                break
+        shape = self._shape(walker.outcome(), targets[-1], walker.pairs)
+        if strict and not shape.converged:
+            how = "a bubble grows without end" if walker.ended == BURST else f"{shape.residual:.1e} N are left"
+            raise NoEquilibrium(
+                f"No equilibrium on the way to step {number_}: {how}. Ask for less pressure, or follow in more increments."
+            )
+        return shape
+
+    def free_radius(self, pressure: ArrayLike, near: ArrayLike | None = None) -> Array:
+        """Outer radius (m) of each bubble if it stood alone at `pressure`, (n,) Pa; of several the one nearest to `near`."""
+        p = np.broadcast_to(np.asarray(pressure, dtype=float), (len(self),))
+        found = np.empty(len(self))
+        for balloon in set(self.balloons):
+            its = np.flatnonzero([one == balloon for one in self.balloons])
+            branches = np.atleast_2d(balloon.heights(p[its])) / 2
+            if near is None:
+                found[its] = branches[:, 0]
+            else:
+                off = np.abs(branches - np.asarray(near, dtype=float)[its, None])
+                found[its] = branches[np.arange(len(its)), np.nanargmin(off, axis=1)]
+        return found
+
+    def free_pressure(self, height_mm: ArrayLike) -> Array:
+        """Pressure (Pa) that holds each bubble at `height_mm`, (n,), if it stood alone; 0 at its rest height and below."""
+        radius = np.maximum(np.asarray(height_mm, dtype=float) * 0.5e-3, self.bubbles["outer"])
+        held = np.empty(len(self))
+        hold(radius, self.bubbles, held)
+        return np.maximum(held, 0.0)
+
+    def height_by_air(self, shape: Shape, line_volume: float = LINE_VOLUME) -> Array:
+        """Height in mm of each bubble alone with the air (pV, line included) that it has in `shape`, (n,)."""
+        found = np.empty(len(self))
+        for i, balloon in enumerate(self.balloons):
+            air = (ATMOSPHERE + shape.pressure[i]) * (balloon.volume(shape.stretch[i]) + line_volume)
+            low, high = balloon.stretch_at_height(balloon.rest_height), 8.0
+            for _ in range(60):  # air grows with the stretch: halving cannot miss
+                middle = (low + high) / 2
+                more = (ATMOSPHERE + balloon.pressure(middle)) * (balloon.volume(middle) + line_volume) > air
+                low, high = (low, middle) if more else (middle, high)
+            found[i] = 1e3 * balloon.height(low)
+        return found
+
+    def height_slope(self, shape: Shape) -> Array:
+        """∂height/∂pressure of the settled `shape`, (n, n) m/Pa: row i, column j is bubble i's height by j's pressure.
+
+        From the implicit function theorem: H ds = 4π R² dP e, H the second derivatives of the energy. Raises
+        `NoEquilibrium` if `shape` is not a stable one.
+        """
+        n = len(self)
+        rhs, out = np.zeros((n, n, 4)), np.zeros((n, n, 4))
+        rhs[np.arange(n), np.arange(n), 3] = 4 * np.pi * shape.radius**2
+        walker = self._walker(shape)
+        if not solve(shape.state, shape.pressure, self.bubbles, walker.springs, walker.pairs, rhs, out, 1e-9):
+            raise NoEquilibrium("The shape is about to snap: its heights have no slope. Change a pressure a little.")
+        return np.asarray((out[:, :, 2] + out[:, :, 3]).T)
+
+    def energy(self, state: Array, pressure: ArrayLike) -> float:
+        """Energy (J) of `state`, (n, 4) m, at gauge `pressure`, (n,) Pa."""
+        return self._evaluate(state, pressure)[0]
+
+    def gradient(self, state: Array, pressure: ArrayLike) -> Array:
+        """Its gradient, (n, 4) N; zero in equilibrium."""
+        return self._evaluate(state, pressure)[1]
+
+    # Inside.
+
+    def _evaluate(self, state: Array, pressure: ArrayLike) -> tuple[float, Array]:
+        state = np.ascontiguousarray(state, dtype=float)
+        p = np.array(np.broadcast_to(np.asarray(pressure, dtype=float), (len(self),)))
+        walker = PathFollower(self.bubbles, self.springs, state)
+        aside = np.hypot(state[:, 0] - self.bubbles["x"], state[:, 1] - self.bubbles["y"]).max()
+        walker.reach(float(state[:, 3].max() + aside))
+        out = np.empty_like(state)
+        return float(evaluate(state, p, self.bubbles, walker.springs, walker.pairs, out)), out
+
+    def _walker(self, shape: Shape) -> PathFollower:
+        walker = PathFollower(self.bubbles, self.springs, shape.state)
+        aside = np.hypot(shape.state[:, 0] - self.bubbles["x"], shape.state[:, 1] - self.bubbles["y"]).max()
+        walker.reach(float(shape.radius.max() + aside))
+        return walker
+
+    def _flat(self) -> Array:
+        r = self.bubbles["outer"]
+        return np.column_stack([self.bubbles["x"], self.bubbles["y"], r, r])
+
+    def _pressures(self, steps: ArrayLike) -> Array:
+        targets = np.atleast_2d(finite("steps", steps))
+        if targets.ndim != 2 or targets.shape[1] != len(self) or not len(targets):
+            raise InvalidInput(
+                f"Steps are a (k, {len(self)}) array, a gauge pressure in Pa per bubble and step; this one is {targets.shape}."
+            )
+        for balloon in set(self.balloons):  # refuses what is negative or more than it holds, in its own words
+            its = [one == balloon for one in self.balloons]
+            balloon.stretches(np.array([targets[:, its].min(), targets[:, its].max()]))
+        return targets
+
+    def _shape(self, outcome: Outcome, pressure: Array, pairs: NDArray[np.int64]) -> Shape:
+        state = outcome.state
+        i, j = pairs.T
+        overlap = state[i, 3] + state[j, 3] - np.sqrt(((state[i, :3] - state[j, :3]) ** 2).sum(axis=1))
+        contacts = tuple(
+            Contact(int(i[k]), int(j[k]), self.kc * float(overlap[k]), 1e3 * float(overlap[k]))
+            for k in np.flatnonzero(overlap > 0)
+        )
+        b = self.bubbles
+        stretch = np.cbrt(1 + (state[:, 3] ** 3 - b["outer"] ** 3) / b["radius"] ** 3)
+        return Shape(
+            height_mm=1e3 * (state[:, 2] + state[:, 3]),
+            position=state[:, :3].copy(),
+            stretch=np.where(b["thick"], stretch, state[:, 3] / b["radius"]),
+            contacts=contacts,
+            pressure=np.array(pressure),
+            radius=state[:, 3].copy(),
+            snaps=outcome.snaps,
+            energy=outcome.energy,
+            residual=outcome.residual,
+            converged=outcome.ended == CONVERGED,
+            increments=outcome.increments,
+        )
+
+
+def balloons_of(balloon: YeohBalloon | Sequence[YeohBalloon] | None, layout: Layout) -> tuple[YeohBalloon, ...]:
+    """One balloon per bubble; the paper's where none is given."""
+    if balloon is None or isinstance(balloon, YeohBalloon):
+        return (balloon or YeohBalloon(),) * len(layout)
+    balloons = tuple(balloon)
+    if len(balloons) != len(layout):
+        raise InvalidInput(f"{len(balloons)} balloons for {len(layout)} bubbles: give one for all, or one each.")
+    return balloons
+
+
+def _records(layout: Layout, balloons: Sequence[YeohBalloon]) -> NDArray[Any]:
+    records: NDArray[Any] = np.zeros(len(layout), core.BUBBLE)
+    records["x"], records["y"] = layout.positions_mm.T * 1e-3
+    for record, balloon in zip(records, balloons, strict=True):
+        for name in ("mu", "c2", "c3", "thickness", "radius"):
+            record[name] = getattr(balloon, name)
+        record["inner"], record["outer"] = balloon.inner_radius, balloon.outer_radius
+        record["thick"] = balloon.wall == "thick"
+    return records

@@ -1,0 +1,1 @@
+"""What a wristband tells of itself, as Python values."""

@@ -1,0 +1,230 @@
+"""Weighted, robust, bounded regression of the Yeoh constants on points with noise in both axes.
+
+The pressure is linear in θ = (μ, C2, C3), so each pass is a linear least-squares problem. Noise in height
+enters by projection: every point is moved to the nearest place η on the curve, near in units of its own
+noise, and its pressure is carried there along the tangent (orthogonal distance regression, Boggs and
+Rogers 1990, for a model that is linear in its constants). Outliers are weighed down by Tukey's bisquare
+around a start that half the points cannot spoil (an MM estimate, Yohai 1987).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from bubbleskin.errors import InvalidInput
+from bubbleskin.membrane import wall as walls
+from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon, yeoh_pressure
+
+HUBER = 1.345  # standard deviations; these two give 95 % efficiency on clean Gaussian noise
+BISQUARE = 4.685
+LOST = 6e-5  # of good points are taken for outliers: with many points those beyond 4 standard deviations
+PASSES = 60
+TOLERANCE = 1e-7  # relative change of θ at which the passes end
+
+_UNIT = np.eye(3)[:, :, None]  # θ = (1,0,0), (0,1,0), (0,0,1), to broadcast over points
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What the fit takes as given: the rest sizes of the bubble and the kind of its wall."""
+
+    radius: float
+    thickness: float
+    wall: Wall
+    surface: Surface
+
+    def balloon(self, theta: np.ndarray) -> YeohBalloon:
+        """The bubble of this shape made of the material ``theta``."""
+        mu, c2, c3 = (float(v) for v in theta)
+        return YeohBalloon(
+            mu=mu, c2=c2, c3=c3, thickness=self.thickness, radius=self.radius, wall=self.wall,
+            surface=self.surface,
+        )  # fmt: skip
+
+    @property
+    def rest_height(self) -> float:
+        """Height (m) without pressure."""
+        return 2 * walls.rest_radii(self.thickness, self.radius, self.wall, self.surface)[1]
+
+    def at_least(self, height: np.ndarray) -> np.ndarray:
+        """Heights kept where the formulas hold: noise may put a point a little below rest, not into the wall."""
+        return np.maximum(height, 0.97 * self.rest_height)
+
+    def basis(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """∂P/∂θ and ∂²P/∂θ∂h at ``height`` (m), each (n, 3): the model is P = basis · θ."""
+        sizes = (self.thickness, self.radius, self.wall, self.surface)
+        x = walls.stretch_of_outer(height / 2, *sizes)
+        mu, c2, c3 = _UNIT[:, 0], _UNIT[:, 1], _UNIT[:, 2]
+        if self.wall == "thin":
+            P = yeoh_pressure(x, mu, c2, c3, self.thickness, self.radius)
+        else:
+            P = walls.thick_pressure(x, mu, c2, c3, *sizes)
+        dP = walls.slope(x, mu, c2, c3, *sizes) / (2 * walls.radius_slope(x, *sizes)[1])
+        return P.T, dP.T
+
+
+@dataclass(frozen=True)
+class Points:
+    """Measured points of one bubble: height (m), pressure (Pa) and the standard deviation of each."""
+
+    height: np.ndarray
+    pressure: np.ndarray
+    height_sd: np.ndarray
+    pressure_sd: np.ndarray
+
+    def __len__(self) -> int:
+        return self.height.size
+
+    def of(self, mask: np.ndarray) -> Points:
+        """Those points that ``mask`` marks."""
+        return Points(self.height[mask], self.pressure[mask], self.height_sd[mask], self.pressure_sd[mask])
+
+
+class Linear(NamedTuple):
+    """The regression problem as seen from one θ: rows of ``design`` against ``target``, unit noise."""
+
+    design: np.ndarray  # (n, 3)
+    target: np.ndarray  # (n,)
+
+    def residuals(self, theta: np.ndarray) -> np.ndarray:
+        """Signed distances from the curve in units of the noise."""
+        return self.target - (self.design * theta).sum(axis=1)
+
+
+class Solution(NamedTuple):
+    """Where the passes ended."""
+
+    theta: np.ndarray
+    linear: Linear
+    weights: np.ndarray  # of each point, 0 (ignored) to 1
+    scale: float  # noise found, in units of the noise stated
+
+
+def start(shape: Shape, points: Points) -> np.ndarray:
+    """The paper's material scaled by the median of measured over expected pressure."""
+    theta = np.array([YeohBalloon.mu, YeohBalloon.c2, YeohBalloon.c3])
+    sunk = points.height < 0.9 * shape.rest_height
+    if sunk.any():
+        k = int(np.argmax(sunk))
+        raise InvalidInput(
+            f"point {k} is {points.height[k] * 1e3:g} mm tall, but a bubble of this diameter is "
+            f"{shape.rest_height * 1e3:g} mm tall at rest: check the units, the diameter, and of which surface it is."
+        )
+    lifted = points.height > 1.05 * shape.rest_height
+    if not lifted.any():
+        raise InvalidInput(
+            f"no point is more than 5 % above the rest height of {shape.rest_height * 1e3:g} mm: "
+            "there is no inflation to fit. Check the units and the diameter."
+        )
+    expected = shape.basis(points.height[lifted])[0] @ theta
+    ratio = float(np.median(points.pressure[lifted] / expected))
+    if ratio <= 0:
+        raise InvalidInput("more than half of the pressures are zero or negative: there is nothing to fit.")
+    return theta * ratio
+
+
+def project(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) -> np.ndarray:
+    """The place on the curve nearest to each point, from the guess ``eta``, in heights (m).
+
+    ``theta`` is (3,) for points of one curve, (n, 3) if each point has its own.
+    """
+    for _ in range(3):
+        basis, slopes = shape.basis(eta)
+        P, dP = (basis * theta).sum(axis=1), (slopes * theta).sum(axis=1)
+        gradient = (eta - points.height) / points.height_sd**2 + (P - points.pressure) * dP / points.pressure_sd**2
+        curvature = 1 / points.height_sd**2 + (dP / points.pressure_sd) ** 2
+        step = np.clip(gradient / curvature, -0.1 * shape.rest_height, 0.1 * shape.rest_height)
+        eta = shape.at_least(eta - step)
+    return eta
+
+
+def linearise(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) -> Linear:
+    """The problem with each point carried along the tangent to its place ``eta`` on the curve."""
+    basis, slopes = shape.basis(eta)
+    dP = (slopes * theta).sum(axis=1)
+    sd = np.sqrt(points.pressure_sd**2 + (dP * points.height_sd) ** 2)
+    return Linear(basis / sd[:, None], (points.pressure + dP * (eta - points.height)) / sd)
+
+
+def solve_bounded(linear: Linear, weights: np.ndarray) -> np.ndarray:
+    """Least squares with C3 ≥ 0, and C2 ≥ 0 where C3 is 0: else the wall would lose its stiffness."""
+    X = linear.design * np.sqrt(weights)[:, None]
+    A, b = X.T @ X, X.T @ (linear.target * np.sqrt(weights))
+    theta = np.zeros(3)
+    for free in (3, 2, 1):
+        scale = 1 / np.sqrt(np.diag(A)[:free])
+        part = np.linalg.lstsq(A[:free, :free] * np.outer(scale, scale), b[:free] * scale, rcond=1e-15)[0]
+        theta[:] = 0.0
+        theta[:free] = part * scale
+        if free == 1 or theta[free - 1] >= 0:
+            break
+    if theta[0] < 100:
+        raise InvalidInput(
+            f"the best fit has a shear modulus of {theta[0] / 1e3:.3g} kPa, which no elastomer has: check "
+            "that the columns are height and gauge pressure, their units, the diameter and the wall."
+        )
+    return theta
+
+
+def median_scale(residuals: np.ndarray, fitted: int = 3) -> float:
+    """Standard deviation of the bulk of ``residuals`` by their median absolute value, never quite zero."""
+    spare = max(residuals.size - fitted, 1)
+    return max(1.4826 * float(np.median(np.abs(residuals))) * np.sqrt(residuals.size / spare), 1e-3)
+
+
+def huber(u: np.ndarray) -> np.ndarray:
+    """Huber's weights at residuals ``u`` in units of the scale."""
+    return np.minimum(1.0, HUBER / np.maximum(np.abs(u), 1e-300))
+
+
+def bisquare(u: np.ndarray) -> np.ndarray:
+    """Tukey's bisquare weights at residuals ``u`` in units of the scale."""
+    return np.clip(1 - (u / BISQUARE) ** 2, 0, None) ** 2
+
+
+def within(residuals: np.ndarray, scale: float, fitted: float = 3) -> np.ndarray:
+    """1 for good points, 0 for outliers; at least 4 are kept.
+
+    The fewer the points, the less is known of the scale, and the further out a point must be.
+    """
+    cut = float(stats.t.isf(LOST / 2, max(residuals.size - fitted, 1.0)))
+    kept = np.abs(residuals) <= cut * scale
+    if kept.sum() < 4:
+        kept[np.argsort(np.abs(residuals))[:4]] = True
+    return kept.astype(float)
+
+
+def kept_scale(residuals: np.ndarray, weights: np.ndarray, fitted: float = 3) -> float:
+    """Standard deviation of the points that ``weights`` keeps, for that many constants fitted."""
+    return max(float(np.sqrt(np.sum(weights * residuals**2) / max(np.sum(weights) - fitted, 1.0))), 1e-9)
+
+
+def regress(shape: Shape, points: Points, *, robust: bool) -> Solution:
+    """Fit θ to ``points``: near by Huber's weights, nearer by bisquare ones, then without the outliers."""
+    theta, eta = start(shape, points), shape.at_least(points.height)
+    weights, scale = np.ones(len(points)), 1.0
+    for stage in ("huber", "bisquare", "trim") if robust else ("plain",):
+        for _ in range(PASSES):
+            eta = project(shape, points, theta, eta)
+            linear = linearise(shape, points, theta, eta)
+            residuals = linear.residuals(theta)
+            if stage == "huber":
+                scale = median_scale(residuals)
+                weights = huber(residuals / scale)
+            elif stage == "bisquare":
+                weights = bisquare(residuals / scale)
+            elif stage == "trim":
+                weights = within(residuals, scale)
+                scale = kept_scale(residuals, weights)
+            new = solve_bounded(linear, weights)
+            change = float(np.max(np.abs(new - theta) / (np.abs(new) + 1e-6 * new[0])))
+            theta = new
+            if change < (TOLERANCE if stage in ("plain", "trim") else 1e-3):
+                break
+    eta = project(shape, points, theta, eta)
+    linear = linearise(shape, points, theta, eta)
+    return Solution(theta, linear, weights, kept_scale(linear.residuals(theta), weights))

@@ -1,0 +1,1 @@
+"""Which bubble goes first, what to send, and why."""

@@ -1,0 +1,1 @@
+"""Sequences on the host: their model, files, library, compiler and player."""

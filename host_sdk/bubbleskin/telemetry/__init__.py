@@ -1,0 +1,1 @@
+"""Telemetry: the stream, its fields, recordings."""

