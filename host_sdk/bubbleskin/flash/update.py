@@ -7,12 +7,12 @@ from pathlib import Path
 
 from bubbleskin.device.records import Info
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError, WrongDevice
+from bubbleskin.flash import drive as drives
 from bubbleskin.flash import mpy, slots, uf2
-from bubbleskin.flash import run_sync as drives
 from bubbleskin.flash.kept import Kept, UnderWay
 from bubbleskin.flash.machine import Connection, Machine
 from bubbleskin.flash.prompt import Prompt
-from bubbleskin.link.link import run_sync as run
+from bubbleskin.link.link import run_sync
 from bubbleskin.skin import AsyncSkin, Skin
 from bubbleskin.toolchain.rp2040 import BOARDS, firmware
 
@@ -30,7 +30,7 @@ class Order:
 
     board: str | None = None
     device: str | None = None
-    run_sync: Path | None = None
+    drive: Path | None = None
     uf2: Path | None = None
     mpy: bool = False
     previous: bool = False
@@ -63,7 +63,7 @@ def flash(
     """
     if sum((order.uf2 is not None, order.mpy, order.previous)) > 1:
         raise InvalidInput("Say one of --uf2, --mpy and --previous, or none: then today's firmware is taken.")
-    if order.device and order.run_sync:
+    if order.device and order.drive:
         raise InvalidInput("Say --device for a board that runs, or --drive for one in its boot loader, not both.")
     return _Update(machine, order, report, build, files, kept).run()
 
@@ -91,12 +91,12 @@ class _Update:
         self.old: Info | None = None
         self.complaint = ""  # of the last HELLO
 
-    def run(self) -> Outcome:
-        run_sync = self.find()
-        if run_sync is not None:
+    def run_sync(self) -> Outcome:
+        drive = self.find()
+        if drive is not None:
             if self.order.mpy:
                 raise InvalidInput("The board is in its boot loader, which takes a UF2 only: leave --mpy off.")
-            return self.by_uf2(run_sync)
+            return self.by_uf2(drive)
         self.report("asking the board", 0, 1)
         self.old = self.greet(_HELLO_S)
         if self.old:
@@ -113,9 +113,9 @@ class _Update:
         """The drive of the one board that is meant, or None with its port in `port`."""
         order, machine = self.order, self.machine
         ports, found = machine.ports(), machine.drives()
-        if order.run_sync:
+        if order.drive:
             self.others = set(ports)
-            return order.run_sync
+            return order.drive
         if order.device:
             self.port = order.device
             self.others = set(ports) - {order.device}
@@ -170,14 +170,14 @@ class _Update:
         """HELLO once: who answers, None where nobody does or does not speak our protocol."""
         connection = self.machine.open(self.port)
         try:
-            with Skin(run(AsyncSkin.open(connection, timeout))) as skin:
+            with Skin(run_sync(AsyncSkin.open(connection, timeout))) as skin:
                 return skin.info
         except WrongDevice as problem:
             self.complaint = str(problem)
             return None
 
     def restart(self, into: str) -> None:
-        with Skin(run(AsyncSkin.open(self.machine.open(self.port), _HELLO_S))) as skin:
+        with Skin(run_sync(AsyncSkin.open(self.machine.open(self.port), _HELLO_S))) as skin:
             skin.restart(into)
         self.machine.sleep(_STEP_S)
 
@@ -193,7 +193,7 @@ class _Update:
         until = self.machine.now() + _DRIVE_S
         while self.machine.now() < until:
             self.report("waiting for the boot loader's drive", 0, 1)
-            found = [run_sync for run_sync in self.machine.drives() if run_sync not in before]
+            found = [drive for drive in self.machine.drives() if drive not in before]
             if len(found) == 1:
                 return found[0]
             self.machine.sleep(_STEP_S)
@@ -227,8 +227,8 @@ class _Update:
             return uf2.read(path)
         return uf2.read(self.build(self.board()))
 
-    def by_uf2(self, run_sync: Path) -> Outcome:
-        drives.check(run_sync)
+    def by_uf2(self, drive: Path) -> Outcome:
+        drives.check(drive)
         image = self.image()
         board = self.board()
         kept = Kept(board, self.kept)
@@ -237,7 +237,7 @@ class _Update:
         )
         kept.tried(known)
         self.under_way.begin(board)
-        drives.copy(self.machine, run_sync, image, self.report)
+        drives.copy(self.machine, drive, image, self.report)
         back = (
             "; `bubbleskin flash --previous` then brings the last firmware back that worked" if kept.previous() else ""
         )

@@ -69,7 +69,7 @@ def refused_hello(reply: message.Message) -> WrongDevice:
         return WrongDevice(version(reply["low"], reply["high"]))
     if reply["error"] == errors.WRONG_LENGTH:  # it does not know of sessions
         return WrongDevice(version(1, 1))
-    return WrongDevice(message.explain(reply))
+    return WrongDevice(message.describe_refusal(reply))
 
 
 def _fate(request: Request) -> str:

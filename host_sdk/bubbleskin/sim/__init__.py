@@ -4,4 +4,4 @@ from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.faults import Faults, LossyTransport
 from bubbleskin.sim.transport import SimulatedTransport, open_board
 
-__all__ = ["FaultLink", "Faults", "SimulatedBoard", "SimulatedTransport", "open_board"]
+__all__ = ["Faults", "LossyTransport", "SimulatedBoard", "SimulatedTransport", "open_board"]
