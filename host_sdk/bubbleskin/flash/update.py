@@ -91,7 +91,7 @@ class _Update:
         self.old: Info | None = None
         self.complaint = ""  # of the last HELLO
 
-    def run_sync(self) -> Outcome:
+    def run(self) -> Outcome:
         drive = self.find()
         if drive is not None:
             if self.order.mpy:
