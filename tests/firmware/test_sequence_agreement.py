@@ -8,7 +8,7 @@ import pytest
 import bubbleskin as bs
 from bubble_protocol import steps
 from bubble_protocol.schema import errors, messages
-from bubbleskin.device.records import Info
+from bubbleskin.device.info import Info
 from bubbleskin.sequence.compile import Program, check
 
 EASINGS = ["linear", "smooth", "in", "out"]

@@ -8,9 +8,10 @@ import pytest
 
 import bubbleskin as bs
 from bubble_protocol.schema import faults, messages
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 
 pytestmark = pytest.mark.timeout(60)
 

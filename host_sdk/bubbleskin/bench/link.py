@@ -146,7 +146,7 @@ def _echo(name: str) -> list[float]:
 def _board(name: str) -> tuple[list[float], list[float]]:
     shows, pings = [], []
     with connect(name) as skin:
-        link = skin._skin._link
+        link = skin.link
         for count in range(_EACH):
             begin = time.perf_counter()
             run_sync(link.call("SHOW", (0,), [(8000 + count,)] * 7))

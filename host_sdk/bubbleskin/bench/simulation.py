@@ -4,11 +4,12 @@ import time
 
 import numpy as np
 
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.bench.rows import Row
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.transport import SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 
 _VIRTUAL = 20.0  # seconds
 _EVERY = 2.0  # seconds between two shows

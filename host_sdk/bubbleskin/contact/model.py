@@ -7,6 +7,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bubbleskin.checks import finite, number, one_of, positive
 from bubbleskin.contact import energy as core
 from bubbleskin.contact.continuation import HALVINGS, MOVE, Outcome, PathFollower, Snap, ramps
 from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
@@ -14,7 +15,6 @@ from bubbleskin.errors import InvalidInput, NoEquilibrium
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
 from bubbleskin.membrane.balloon import ATMOSPHERE
-from bubbleskin.membrane.checks import finite, number, one_of, positive
 
 Array = NDArray[np.float64]
 Ramp = Literal["pressure", "height"]

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bubbleskin.checks import finite, number, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.membrane.checks import finite, number, positive
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from bubbleskin.checks import finite, like, number, one_of, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane import wall as walls
 from bubbleskin.membrane.branches import MonotonePieces
-from bubbleskin.membrane.checks import finite, like, number, one_of, positive
 
 ATMOSPHERE = 101_325.0
 """Standard ambient pressure in Pa; gauge pressures are above it."""

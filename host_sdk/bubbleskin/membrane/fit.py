@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
+from bubbleskin.checks import finite, like, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon
-from bubbleskin.membrane.checks import finite, like, positive
 from bubbleskin.membrane.regression import Points, Shape, Solution, regress
 
 HEIGHT_SD = 0.05e-3

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bubbleskin.checks import finite
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import YeohBalloon
-from bubbleskin.membrane.checks import finite
 
 MAX_KNOTS = 64
 MAX_PRESSURE = 0xFFFF  # Pa, an unsigned 16-bit knot

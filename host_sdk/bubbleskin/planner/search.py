@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin.checks import number, positive
 from bubbleskin.contact.model import CompliantContact, Shape, balloons_of
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
-from bubbleskin.membrane.checks import number, positive
 from bubbleskin.planner.explain import explain
 from bubbleskin.planner.inverse import GOAL_MM, Order, correct, pairs, steps_of, triples
 from bubbleskin.shape.heightfield import Heights, sample

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubble_protocol import steps as wire
-from bubbleskin.device.records import Info
+from bubbleskin.device.info import Info
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.message import crc32
-from bubbleskin.sequence.model import EASINGS, THEN, After, Repeat, Sequence, Step
+from bubbleskin.sequence.model import Sequence
+from bubbleskin.sequence.steps import EASINGS, THEN, After, Repeat, Step
 
 _PLACE_MM = 0.5
 """How far a bubble may be from where a sequence wants it."""

@@ -7,7 +7,8 @@ import socket
 from collections.abc import Callable, Iterator
 
 from bubbleskin.errors import InvalidInput, LinkError
-from bubbleskin.sim.transport import Board, Pace
+from bubbleskin.sim.simulated import Simulated
+from bubbleskin.sim.transport import Pace
 
 _OUT_MAX = 65536  # bytes kept for a program that does not read; older ones are dropped, as a full USB buffer does
 
@@ -103,7 +104,7 @@ class TcpEnd:
         self._client = None
 
 
-def serve(board: Board, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lambda: True) -> Iterator[Board]:
+def serve(board: Simulated, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lambda: True) -> Iterator[Simulated]:
     """Run `board` at the wall clock's pace behind `end` for as long as `running()`; yields the board after every tick."""
     pace = Pace(board)
     out = bytearray()
@@ -122,7 +123,7 @@ def serve(board: Board, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lamb
         yield board
 
 
-def _hand_over(board: Board, end: PtyEnd | TcpEnd, out: bytearray) -> None:
+def _hand_over(board: Simulated, end: PtyEnd | TcpEnd, out: bytearray) -> None:
     """What the board sends, and what `out` still has of it, as far as it fits."""
     out += board.from_device
     board.from_device.clear()

@@ -3,35 +3,13 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.link.transport import Transport
 from bubbleskin.sim.board import SimulatedBoard, load_board
 from bubbleskin.sim.faults import Faults, LossyTransport
 from bubbleskin.sim.flash import NorFlash
-
-
-class Board(Protocol):
-    """What a link needs of a board that is simulated, one way or another."""
-
-    to_device: bytearray
-    from_device: bytearray
-    tick_s: float
-
-    @property
-    def time(self) -> float:
-        """Virtual seconds since the start."""
-
-    def tick(self) -> None:
-        """Let one period pass."""
-
-    def listen(self, phase_us: int) -> None:
-        """Let the firmware answer what has come, `phase_us` after a period has begun."""
-
-    def close(self) -> None:
-        """End it."""
-
+from bubbleskin.sim.simulated import Simulated
 
 _SHARES = ("spread", "loss")
 _BEHIND = 0.1  # seconds a real-time simulation may lag before it gives up catching up
@@ -40,7 +18,7 @@ _BEHIND = 0.1  # seconds a real-time simulation may lag before it gives up catch
 class SimulatedTransport:
     """A `Transport` to a simulated board. With `realtime`, virtual time keeps pace with the wall's."""
 
-    def __init__(self, board: Board, name: str, realtime: bool = False):
+    def __init__(self, board: Simulated, name: str, realtime: bool = False):
         self.board = board
         self.name = name
         self.blocks = realtime
@@ -87,7 +65,7 @@ class SimulatedTransport:
 class Pace:
     """Keeps a board's virtual time at the wall's, tick by tick."""
 
-    def __init__(self, board: Board):
+    def __init__(self, board: Simulated):
         self._board = board
         self._start = time.monotonic() - board.time
 
@@ -148,7 +126,7 @@ class Options:
         )
 
 
-def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transport, Board]:
+def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transport, Simulated]:
     """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it."""
     url = f"{scheme}://{name}"
     chosen = Options.parse(options, url)
@@ -157,7 +135,7 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transpo
     return LossyTransport(transport, faults, seed=chosen.seed) if chosen.loss else transport, board
 
 
-def _open(scheme: str, name: str, url: str, chosen: Options) -> tuple[SimulatedTransport, Board]:
+def _open(scheme: str, name: str, url: str, chosen: Options) -> tuple[SimulatedTransport, Simulated]:
     data = load_board(name)
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip

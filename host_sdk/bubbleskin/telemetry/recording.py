@@ -9,7 +9,8 @@ from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any, Self
 
-from bubbleskin.device.records import Info, State
+from bubbleskin.device.info import Info
+from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import run_sync

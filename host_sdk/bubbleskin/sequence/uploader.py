@@ -1,0 +1,66 @@
+"""Brings a program's records to a device: all of them, or those of a stream as there is room for them."""
+
+import itertools
+
+from bubbleskin.link.link import Call, Link
+from bubbleskin.sequence.compile import Program
+
+_WORDS_PER_MESSAGE = 121
+_TOGETHER = 8
+"""Messages on their way at once: each has as long as any other call."""
+
+
+class Uploader:
+    """The upload of `program` as the sequence `identity` into a memory of `capacity` records."""
+
+    def __init__(self, link: Link, identity: int, program: Program, capacity: int):
+        self.id = identity
+        self.program = program
+        self.sequence = program.sequence
+        self.streams = len(program) > capacity
+        """Whether the memory does not hold it all, so that the rest is sent while it plays."""
+        self.total = program.played if self.streams else len(program)
+        """Records to send in all; 0 where there is no end."""
+        self.unsent = True
+        """Whether there is more to send."""
+        self._link = link
+        self._order = program.stream() if self.streams else iter(range(len(program)))
+        self._per_message = _WORDS_PER_MESSAGE // program.records.shape[1]
+        self._sent: list[int] = []  # records, in the order in which they were sent
+        self._free = capacity
+
+    def step(self, record: int) -> int:
+        """The step that the device's record is; -1 where it is none of ours."""
+        return int(self.program.steps[self._sent[record]]) if record < len(self._sent) else -1
+
+    def name(self, step: int) -> str:
+        """The name of a step; empty where it has none."""
+        return self.sequence.each[step].name if step >= 0 else ""
+
+    async def fill(self) -> None:
+        """Send all that there is room for."""
+        if not self.unsent:
+            return
+        if not self._free:
+            self._free = (await self._link.call("SEQUENCE_STATE"))["free"]
+        while self._free:
+            calls, sent = self._next_calls()
+            if not calls:
+                break
+            replies = await self._link.calls(calls)
+            self._sent += sent
+            self._free = replies[-1]["free"]
+        self.unsent = self.total == 0 or len(self._sent) < self.total
+
+    def _next_calls(self) -> tuple[list[Call], list[int]]:
+        """As many messages as go together and have room, and the records in them."""
+        calls: list[Call] = []
+        sent: list[int] = []
+        while len(calls) < _TOGETHER:
+            part = list(itertools.islice(self._order, min(self._per_message, self._free - len(sent))))
+            if not part:
+                break
+            words = self.program.records[part].reshape(-1, 1).tolist()
+            calls.append(("SEQUENCE_WRITE", (self.id, len(self._sent) + len(sent) & 0xFFFF), words))
+            sent += part
+        return calls, sent
