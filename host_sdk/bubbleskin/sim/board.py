@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubble_firmware import boards
+from bubble_firmware.hal.lockstep import LINK_IN
 from bubbleskin.contact.model import CompliantContact
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.sim.firmware import LINK_IN, Firmware, InProcessFirmware, Outputs
+from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.plant import Plant, PlantParameters
 

@@ -7,9 +7,6 @@ from typing import NamedTuple, Protocol
 from bubble_firmware.app import App
 from bubbleskin.sim.flash import NorFlash
 
-LINK_IN = 256
-"""Bytes of the link that the firmware takes in one tick."""
-
 
 class Outputs(NamedTuple):
     """What the firmware decided in one tick, for the period after it."""
