@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
-from bubbleskin.checks import finite, like, positive
+from bubbleskin.checks import Numbers, finite, like, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon
 from bubbleskin.membrane.regression import Points, Shape, Solution, regress
@@ -85,20 +85,20 @@ class YeohFit:
         ends[2] = np.maximum(ends[2], 0.0)
         return ends
 
-    def pressure_sd(self, height: Any) -> Any:
+    def pressure_sd(self, height: Numbers) -> Numbers:
         """Standard deviation (Pa) of the model's pressure at ``height`` (m)."""
         h = positive("height", height, "m")
         basis, _ = self.shape.basis(np.atleast_1d(h).ravel())
         sd = np.sqrt(np.einsum("ij,jk,ik->i", basis, self.covariance, basis)).reshape(np.shape(h))
         return like(height, sd)
 
-    def pressure_band(self, height: Any, level: float = 0.95) -> tuple[Any, Any]:
+    def pressure_band(self, height: Numbers, level: float = 0.95) -> tuple[Numbers, Numbers]:
         """Lowest and highest pressure (Pa) of the model at ``height`` (m) that the data allows."""
         middle = self.balloon.pressure_at_height(height)
         half = self._quantile(level) * self.pressure_sd(height)
         return middle - half, middle + half
 
-    def height_band(self, pressure: Any, level: float = 0.95, *, up_to: float = 0.0) -> tuple[Any, Any]:
+    def height_band(self, pressure: Numbers, level: float = 0.95, *, up_to: float = 0.0) -> tuple[Numbers, Numbers]:
         """Lowest and highest height (m) at ``pressure`` (Pa) that the data allows.
 
         All heights whose pressure band holds the pressure are allowed, so on a plateau, or across a snap,

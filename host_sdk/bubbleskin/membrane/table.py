@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from bubbleskin.checks import finite
 from bubbleskin.errors import InvalidInput
@@ -93,7 +94,11 @@ class Table:
 
     # What the firmware computes.
 
-    def pressure_at(self, height_um: Any) -> Any:
+    @overload
+    def pressure_at(self, height_um: float) -> int: ...
+    @overload
+    def pressure_at(self, height_um: NDArray[Any]) -> NDArray[np.int64]: ...
+    def pressure_at(self, height_um: ArrayLike) -> int | NDArray[np.int64]:
         """Pressure (Pa) at a height (µm), in integers: p0 + (p1 − p0)(h − h0) // (h1 − h0), floored.
 
         Below the first knot the first value, above the last one the last. Heights that are not whole are
@@ -106,7 +111,11 @@ class Table:
         p = p0 + (p1 - p0) * (h - h0) // (h1 - h0)
         return int(p) if np.ndim(height_um) == 0 else p
 
-    def slope_at(self, height_um: Any) -> Any:
+    @overload
+    def slope_at(self, height_um: float) -> int: ...
+    @overload
+    def slope_at(self, height_um: NDArray[Any]) -> NDArray[np.int64]: ...
+    def slope_at(self, height_um: ArrayLike) -> int | NDArray[np.int64]:
         """Slope of the segment in Pa per mm, floored, for feed-forward; 0 outside the table."""
         h, k = self._segment(height_um)
         rise = np.diff(self.pressure_pa)[k] * 1000 // np.diff(self.height_um)[k]
