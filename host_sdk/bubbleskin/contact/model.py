@@ -62,6 +62,11 @@ class Shape:
     increments: int
     """Relaxations on the way here, halved increments included."""
 
+    def __repr__(self) -> str:
+        low, high = self.height_mm.min(), self.height_mm.max()
+        end = "settled" if self.converged else f"not at rest, {self.residual:.2g} N left"
+        return f"<Shape of {len(self)} bubbles, {low:.2f} to {high:.2f} mm, {len(self.contacts)} contacts, {end}>"
+
     def __len__(self) -> int:
         return len(self.height_mm)
 
@@ -114,6 +119,9 @@ class CompliantContact:
             raise InvalidInput(
                 f"Bubbles {close[0][0]} and {close[0][1]} are in one place; the layout must keep them apart."
             )
+
+    def __repr__(self) -> str:
+        return f"<CompliantContact of {len(self)} bubbles>"
 
     def __len__(self) -> int:
         return len(self.layout)

@@ -43,6 +43,9 @@ class RigidContact:
         self.layout = layout
         positive("rest_radius_mm", number("rest_radius_mm", rest_radius_mm), "mm")
         self.rest_radius_mm = float(rest_radius_mm)
+
+    def __repr__(self) -> str:
+        return f"<RigidContact of {len(self.layout)} bubbles>"
         gap = layout.positions_mm[:, None] - layout.positions_mm[None]
         self._distance = np.hypot(gap[..., 0], gap[..., 1])
         np.fill_diagonal(self._distance, np.inf)

@@ -54,9 +54,17 @@ class Fault:
         """What to do about it."""
         return guide(self.name).remedy
 
+    @property
+    def where(self) -> str:
+        """The bubble or the board, in words."""
+        return "the board" if self.bubble is None else f"bubble {self.bubble}"
+
+    def __repr__(self) -> str:
+        seen = "acknowledged" if self.acknowledged else "not acknowledged"
+        return f"<Fault {self.id}: {self.name} of {self.where} at {self.time:.3f} s, {seen}>"
+
     def __str__(self) -> str:
-        where = "the board" if self.bubble is None else f"bubble {self.bubble}"
-        return f"{self.name} of {where} at {self.time:.3f} s: {self.meaning}. Look for {self.cause}. {self.remedy}."
+        return f"{self.name} of {self.where} at {self.time:.3f} s: {self.meaning}. Look for {self.cause}. {self.remedy}."
 
 
 async def read_log(link: Link, tick: float) -> list[Fault]:

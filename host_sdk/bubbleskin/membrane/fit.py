@@ -78,6 +78,10 @@ class YeohFit:
         """The fitted balloon in a list, as a sheet's fit has several."""
         return [self.balloon]
 
+    def __repr__(self) -> str:
+        mu, c2, c3 = self.parameters
+        return f"<YeohFit of {self.residuals.size} points: mu {mu / 1e3:.4g} kPa, C2 {c2:.4g} Pa, C3 {c3:.4g} Pa>"
+
     def interval(self, level: float = 0.95) -> np.ndarray:
         """Confidence interval of each constant, (3, 2) in Pa; C3's is cut off at 0."""
         half = self._quantile(level) * np.sqrt(np.diag(self.covariance))

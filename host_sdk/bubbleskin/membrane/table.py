@@ -89,6 +89,10 @@ class Table:
     def __hash__(self) -> int:
         return self.crc32
 
+    def __repr__(self) -> str:
+        low, high = self.height_um[0] / 1000, self.height_um[-1] / 1000
+        return f"<Table of {len(self)} knots, {low:g} to {high:g} mm, up to {self.pressure_pa.max() / 1000:.2f} kPa>"
+
     def __len__(self) -> int:
         return int(self.height_um.size)
 

@@ -97,6 +97,9 @@ class Recording:
         self._broken: OSError | None = None
         self.lost = 0
 
+    def __repr__(self) -> str:
+        return f"<Recording {self.path}: {self.rows} rows, {self.lost} lost>"
+
     @property
     def path(self) -> Path:
         """The file."""
