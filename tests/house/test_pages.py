@@ -1,0 +1,43 @@
+"""Pages name what is there: every path in them exists, every link leads somewhere."""
+
+import re
+from pathlib import Path
+
+ROOTS = ("", "protocol", "firmware", "host_sdk", "protocol/bubble_protocol", "firmware/bubble_firmware", "host_sdk/bubbleskin")
+PATH = re.compile(r"`((?:\.?[\w*-]+/)+[\w.*-]*|[\w/-]+\.(?:py|md|toml|json|txt))`")
+LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
+
+
+def missing(pages: dict[str, str], root: Path) -> list[str]:
+    """Paths in backquotes that are in none of the roots, and links without a file."""
+    said = []
+    for page, text in pages.items():
+        for name in PATH.findall(text):
+            if not any(list(root.glob(f"{folder}/{name}".strip("/"))) for folder in ROOTS):
+                said.append(f"{page}: {name}")
+        for name in LINK.findall(re.sub(r"```.*?```", "", text, flags=re.DOTALL)):
+            if not ((root / page).parent / name).exists():
+                said.append(f"{page}: {name}")
+    return said
+
+
+def test_every_path_of_the_pages_exists(pages, root, judge):
+    judge("pages", {line: line for line in missing(pages, root)})
+
+
+def test_every_room_is_in_the_architecture(pages, root):
+    """A room that the page does not name would be found by nobody."""
+    text = pages["docs/architecture.md"]
+    for package in ("firmware/bubble_firmware", "host_sdk/bubbleskin", "tools", "tests"):
+        rooms = {path.name for path in (root / package).iterdir() if path.is_dir() and list(path.glob("*.py"))}
+        assert {room for room in rooms if f"{room}/" not in text} == set()
+
+
+def test_every_decision_is_in_the_list(pages):
+    listed = set(LINK.findall(pages["docs/decisions/README.md"]))
+    assert listed == {Path(page).name for page in pages if page.startswith("docs/decisions/0")}
+
+
+def test_a_path_that_is_not_there_is_found(root):
+    text = "See `link/nowhere.py`, `link/clock.py`, `bubble_firmware/boards/` and [this](control.md), [that](gone.md)."
+    assert missing({"docs/planted.md": text}, root) == ["docs/planted.md: link/nowhere.py", "docs/planted.md: gone.md"]
