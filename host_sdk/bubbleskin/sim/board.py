@@ -20,7 +20,7 @@ from bubbleskin.sim.plant import Plant, PlantParameters
 BOARDS = ("wristband7", "wristband19")
 
 
-class Board(ABC):
+class Simulated(ABC):
     """A simulated wristband in virtual time: it moves only when it is stepped, and the same calls give the same bytes.
 
     What the link, the simulator's server and a script need of one, whatever runs its firmware. `name`, `seed`, `spread`
@@ -83,7 +83,7 @@ class Board(ABC):
         """End the firmware."""
 
 
-class SimulatedBoard(Board):
+class SimulatedBoard(Simulated):
     """A simulated wristband whose firmware and plant are stepped in lockstep, in virtual time.
 
     `name`: wristband7 or wristband19. `seed`: of sensor noise and spread. `spread`: how much walls, valves and

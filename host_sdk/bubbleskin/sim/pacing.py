@@ -2,7 +2,7 @@
 
 import time
 
-from bubbleskin.sim.board import Board
+from bubbleskin.sim.board import Simulated
 
 _BEHIND_MAX = 0.1
 """Seconds that a board may be behind the wall clock before it gives up catching up."""
@@ -11,7 +11,7 @@ _BEHIND_MAX = 0.1
 class Pace:
     """Keeps the virtual time of `board` at the wall clock's, tick by tick."""
 
-    def __init__(self, board: Board):
+    def __init__(self, board: Simulated):
         self._board = board
         self._start = time.monotonic() - board.time
 

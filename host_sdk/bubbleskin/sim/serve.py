@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 
 from bubbleskin.errors import InvalidInput, LinkError
-from bubbleskin.sim.board import Board
+from bubbleskin.sim.board import Simulated
 from bubbleskin.sim.pacing import Pace
 
 _OUT_MAX = 65536
@@ -124,7 +124,7 @@ class TcpEnd(End):
         self._client = None
 
 
-def serve(board: Board, end: End, running: Callable[[], bool] = lambda: True) -> Iterator[Board]:
+def serve(board: Simulated, end: End, running: Callable[[], bool] = lambda: True) -> Iterator[Simulated]:
     """Run `board` at the wall clock's pace behind `end` for as long as `running()`; yields the board after every tick."""
     pace = Pace(board)
     out = bytearray()
@@ -143,7 +143,7 @@ def serve(board: Board, end: End, running: Callable[[], bool] = lambda: True) ->
         yield board
 
 
-def _hand_over(board: Board, end: End, out: bytearray) -> None:
+def _hand_over(board: Simulated, end: End, out: bytearray) -> None:
     """What the board sends, and what `out` still has of it, as far as it fits."""
     out += board.from_device
     board.from_device.clear()

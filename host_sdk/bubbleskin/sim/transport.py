@@ -2,7 +2,7 @@
 
 from bubbleskin.errors import LinkError
 from bubbleskin.link.transport import Transport
-from bubbleskin.sim.board import Board, SimulatedBoard, load_board
+from bubbleskin.sim.board import Simulated, SimulatedBoard, load_board
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.impairment import Impairment, LossyTransport
 from bubbleskin.sim.options import Options
@@ -12,7 +12,7 @@ from bubbleskin.sim.pacing import Pace
 class SimulatedTransport(Transport):
     """A `Transport` to a simulated board. With `realtime`, virtual time keeps pace with the wall clock's."""
 
-    def __init__(self, board: Board, name: str, realtime: bool = False):
+    def __init__(self, board: Simulated, name: str, realtime: bool = False):
         self.board = board
         self.name = name
         self.blocks = realtime
@@ -56,7 +56,7 @@ class SimulatedTransport(Transport):
             raise LinkError(f"The connection to {self.name} is closed; connect again.")
 
 
-def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transport, Board]:
+def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transport, Simulated]:
     """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it."""
     url = f"{scheme}://{name}"
     chosen = Options.parse(options, url)
@@ -66,7 +66,7 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transpo
     return LossyTransport(transport, impairment, seed=chosen.seed) if chosen.loss else transport, board
 
 
-def _start(scheme: str, name: str, chosen: Options) -> Board:
+def _start(scheme: str, name: str, chosen: Options) -> Simulated:
     data = load_board(name)
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip

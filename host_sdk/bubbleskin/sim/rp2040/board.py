@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubbleskin.errors import LinkError
-from bubbleskin.sim.board import Board
+from bubbleskin.sim.board import Simulated
 from bubbleskin.sim.rp2040.banks import Bank, Pca9685Bank, PwmBank
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import Chip
@@ -23,7 +23,7 @@ FAILURES = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
 """What can be made to fail beside what `Plant.inject` knows."""
 
 
-class Rp2040Board(Board):
+class Rp2040Board(Simulated):
     """The board `name`, running the UF2 at `firmware`, in emulated time.
 
     `seed`, `spread` and `contact` are those of `SimulatedBoard`. `absent`: chips that are not soldered in, such as
