@@ -34,7 +34,7 @@ from bubbleskin.telemetry.stream import Telemetry
 if TYPE_CHECKING:
     from bubbleskin.membrane.calibration import Calibration
     from bubbleskin.membrane.table import Table
-    from bubbleskin.sim.simulated import Simulated
+    from bubbleskin.sim.board import Simulated
 
 SETTLE = 3.0
 """Seconds beyond `over` after which `show` gives up waiting; the valves need about half of one."""

@@ -10,7 +10,7 @@ from bubbleskin.link.transport import SerialTransport, Transport, only_attached
 from bubbleskin.skin import Skin
 
 if TYPE_CHECKING:
-    from bubbleskin.sim.simulated import Simulated
+    from bubbleskin.sim.board import Simulated
 
 SIMULATED = ("sim", "micropython", "rp2040")
 NETWORK = ("socket", "rfc2217")

@@ -25,7 +25,7 @@ from bubbleskin.telemetry.recording import Recording
 if TYPE_CHECKING:
     from bubbleskin.membrane.calibration import Calibration
     from bubbleskin.membrane.table import Table
-    from bubbleskin.sim.simulated import Simulated
+    from bubbleskin.sim.board import Simulated
 
 _CLOCK_AGE = 1.0
 """Seconds after which the clock wants new pings."""

@@ -24,14 +24,17 @@ def marked(word):
 
 
 def run(command, **how):
-    return subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, timeout=300, **how)
+    program = Path(sys.executable).with_name(command[0])
+    return subprocess.run([program, *command[1:]], capture_output=True, text=True, timeout=500, **how)
 
 
 def mypy(folder):
     """The revealed types and the errors, by line."""
     settings = folder / "mypy.ini"
     settings.write_text(f"[mypy]\nmypy_path = {':'.join(SOURCES)}\nfollow_imports = silent\n")
-    done = run(["mypy", "--strict", "--config-file", str(settings), "--cache-dir", str(folder), str(SCRIPT)], cwd=folder)
+    done = run(
+        ["mypy", "--strict", "--config-file", str(settings), "--cache-dir", str(folder), str(SCRIPT)], cwd=folder
+    )
     found = re.findall(r"user_script\.py:(\d+): (note|error): (.*)", done.stdout)
     revealed = {int(line): text for line, kind, text in found if kind == "note" and "Revealed type" in text}
     assert revealed, done.stdout + done.stderr
@@ -43,7 +46,7 @@ def pyright(folder):
     settings = folder / "pyrightconfig.json"
     config = {"typeCheckingMode": "standard", "extraPaths": SOURCES, "include": [str(SCRIPT)]}
     settings.write_text(json.dumps(config))
-    done = run(["basedpyright.cli", "--project", str(settings), "--pythonpath", sys.executable, "--outputjson"])
+    done = run(["basedpyright", "--project", str(settings), "--pythonpath", sys.executable, "--outputjson"])
     report = json.loads(done.stdout)["generalDiagnostics"]
     found = [(one["range"]["start"]["line"] + 1, one["severity"], one["message"]) for one in report]
     return (

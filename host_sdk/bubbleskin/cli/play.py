@@ -46,7 +46,7 @@ def play(what: str, loops: int | None, at: float | None, device: str | None, jso
                 def report(playing: PlaybackStatus) -> None:
                     done = f"step {playing.step}{f', {playing.name}' if playing.name else ''}"
                     paused = " (paused)" if playing.state == "paused" else ""
-                    bar.update(task, completed=playing.played, total=playing.steps or None, step=done + paused)
+                    bar.update(task, completed=playing.begun_steps, total=playing.steps or None, step=done + paused)
 
                 played = skin.play(sequence, at=at, progress=report)
         except KeyboardInterrupt:

@@ -43,14 +43,14 @@ class RigidContact:
         self.layout = layout
         positive("rest_radius_mm", number("rest_radius_mm", rest_radius_mm), "mm")
         self.rest_radius_mm = float(rest_radius_mm)
-
-    def __repr__(self) -> str:
-        return f"<RigidContact of {len(self.layout)} bubbles>"
         gap = layout.positions_mm[:, None] - layout.positions_mm[None]
         self._distance = np.hypot(gap[..., 0], gap[..., 1])
         np.fill_diagonal(self._distance, np.inf)
         if (self._distance < 2 * rest_radius_mm - 1e-9).any():
             raise InvalidInput(f"Bubbles of {rest_radius_mm:g} mm radius do not fit this layout even at rest.")
+
+    def __repr__(self) -> str:
+        return f"<RigidContact of {len(self.layout)} bubbles>"
 
     def limits(self, radius_mm: ArrayLike) -> Limits:
         """How large each bubble may be while the others have `radius_mm`, (n,)."""

@@ -64,7 +64,9 @@ class Fault:
         return f"<Fault {self.id}: {self.name} of {self.where} at {self.time:.3f} s, {seen}>"
 
     def __str__(self) -> str:
-        return f"{self.name} of {self.where} at {self.time:.3f} s: {self.meaning}. Look for {self.cause}. {self.remedy}."
+        return (
+            f"{self.name} of {self.where} at {self.time:.3f} s: {self.meaning}. Look for {self.cause}. {self.remedy}."
+        )
 
 
 async def read_log(link: Link, tick: float) -> list[Fault]:

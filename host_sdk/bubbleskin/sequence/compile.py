@@ -20,7 +20,7 @@ _PLACE_MM = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Compiled:
     """Records, (m, words) of 16 bits, and which step each one is: -1 for a repeat or its end."""
 
     sequence: Sequence
@@ -28,8 +28,8 @@ class Program:
     steps: NDArray[np.int64]
 
     @classmethod
-    def of(cls, sequence: Sequence, info: Info, layout: Layout) -> "Program":
-        """The program for that board. `InvalidInput` where the sequence is for another or beyond its limits."""
+    def of(cls, sequence: Sequence, info: Info, layout: Layout) -> "Compiled":
+        """The records for that board. `InvalidInput` where the sequence is for another or beyond its limits."""
         check(sequence, info, layout)
         rows: list[list[int]] = []
         steps: list[int] = []
@@ -66,7 +66,7 @@ class Program:
         return crc32(self.records.astype("<u2").tobytes())
 
     @property
-    def played(self) -> int:
+    def total(self) -> int:
         """How many steps will be played; 0 where there is no end."""
         return _count(self.sequence.steps, self.sequence.loops)
 

@@ -53,13 +53,13 @@ class EventLog:
             state=state,
             reason=reason if state == "ended" else "unended",
             step=step,
-            played=len(self.steps),
+            begun_steps=len(self.steps),
             begun=self.began[-1] if self.began else time,
             time=time,
             unsettled=unsettled,
             timeouts=len(self.timeouts),
             name=upload.name(step),
-            steps=upload.program.played,
+            steps=upload.compiled.total,
         )
 
     def timeout(self, step: int, unsettled: tuple[int, ...], state: State | None = None) -> str:

@@ -22,7 +22,7 @@ class PlaybackStatus:
     """Bubbles that were not there when the last step with a timeout ended by it."""
     timeouts: int
     """Steps that ended by their timeout."""
-    played: int = 0
+    begun_steps: int = 0
     """Steps begun so far, those of repeats every time, as `play` has counted them."""
     name: str = ""
     """The step's."""

@@ -13,7 +13,7 @@ from bubbleskin.fault_guide import remedies
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import Link
 from bubbleskin.link.message import crc32
-from bubbleskin.sequence.compile import Program
+from bubbleskin.sequence.compile import Compiled
 from bubbleskin.sequence.event_log import REASONS, EventLog
 from bubbleskin.sequence.model import Playable, playable
 from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
@@ -40,18 +40,18 @@ class Player:
     async def start(self, what: Playable, at: float | None, *, follow: bool) -> Uploader:
         """Upload a sequence, arm and start it; `follow`: whether its rest can be sent while it plays. See `Skin.play`."""
         sequence = playable(what)
-        program = Program.of(sequence, self._info, self._layout)
+        compiled = Compiled.of(sequence, self._info, self._layout)
         start = self._tick(at)
         link = self._link
         state = await link.call("SEQUENCE_STATE")
-        upload = Uploader(link, state["sequence"] + 1 & 0xFFFF, program, state["capacity"])
+        upload = Uploader(link, state["sequence"] + 1 & 0xFFFF, compiled, state["capacity"])
         if upload.streams and not follow:
             raise InvalidInput(
-                f"The sequence takes {len(program)} records and the memory of this {self._info.board} holds "
+                f"The sequence takes {len(compiled)} records and the memory of this {self._info.board} holds "
                 f"{state['capacity']}: the rest is sent while it plays. Play it with wait=True, or use repeats."
             )
         board = crc32(self._info.board.encode()) if sequence.board else 0
-        await link.call("SEQUENCE_BEGIN", (upload.id, sequence.bubbles, board, upload.total, program.crc))
+        await link.call("SEQUENCE_BEGIN", (upload.id, sequence.bubbles, board, upload.total, compiled.crc))
         self._upload = upload
         await upload.fill()
         await link.call("SEQUENCE_ARM", (upload.id,))
@@ -84,7 +84,7 @@ class Player:
             unsettled=bubbles_of(reply["unsettled"]),
             timeouts=reply["timeouts"],
             name=upload.name(step) if upload else "",
-            steps=upload.program.played if upload else 0,
+            steps=upload.compiled.total if upload else 0,
         )
 
     async def control(self, action: int) -> None:
@@ -109,7 +109,7 @@ class Player:
                 if not status and not link.events:
                     if polled.state == "ended":
                         log.lost += 1  # the event that says so
-                    status = dataclasses.replace(polled, played=len(log.steps))
+                    status = dataclasses.replace(polled, begun_steps=len(log.steps))
             if status and status.state == "ended":
                 return await self._report(log, status)
             if status and progress:

@@ -1,9 +1,9 @@
-"""Brings a program's records to a device: all of them, or those of a stream as there is room for them."""
+"""Brings a sequence's records to a device: all of them, or those of a stream as there is room for them."""
 
 import itertools
 
 from bubbleskin.link.link import Call, Link
-from bubbleskin.sequence.compile import Program
+from bubbleskin.sequence.compile import Compiled
 
 _WORDS_PER_MESSAGE = 121
 _TOGETHER = 8
@@ -11,27 +11,27 @@ _TOGETHER = 8
 
 
 class Uploader:
-    """The upload of `program` as the sequence `identity` into a memory of `capacity` records."""
+    """The upload of `compiled` as the sequence `identity` into a memory of `capacity` records."""
 
-    def __init__(self, link: Link, identity: int, program: Program, capacity: int):
+    def __init__(self, link: Link, identity: int, compiled: Compiled, capacity: int):
         self.id = identity
-        self.program = program
-        self.sequence = program.sequence
-        self.streams = len(program) > capacity
+        self.compiled = compiled
+        self.sequence = compiled.sequence
+        self.streams = len(compiled) > capacity
         """Whether the memory does not hold it all, so that the rest is sent while it plays."""
-        self.total = program.played if self.streams else len(program)
+        self.total = compiled.total if self.streams else len(compiled)
         """Records to send in all; 0 where there is no end."""
         self.unsent = True
         """Whether there is more to send."""
         self._link = link
-        self._order = program.stream() if self.streams else iter(range(len(program)))
-        self._per_message = _WORDS_PER_MESSAGE // program.records.shape[1]
+        self._order = compiled.stream() if self.streams else iter(range(len(compiled)))
+        self._per_message = _WORDS_PER_MESSAGE // compiled.records.shape[1]
         self._sent: list[int] = []  # records, in the order in which they were sent
         self._free = capacity
 
     def step(self, record: int) -> int:
         """The step that the device's record is; -1 where it is none of ours."""
-        return int(self.program.steps[self._sent[record]]) if record < len(self._sent) else -1
+        return int(self.compiled.steps[self._sent[record]]) if record < len(self._sent) else -1
 
     def name(self, step: int) -> str:
         """The name of a step; empty where it has none."""
@@ -60,7 +60,7 @@ class Uploader:
             part = list(itertools.islice(self._order, min(self._per_message, self._free - len(sent))))
             if not part:
                 break
-            words = self.program.records[part].reshape(-1, 1).tolist()
+            words = self.compiled.records[part].reshape(-1, 1).tolist()
             calls.append(("SEQUENCE_WRITE", (self.id, len(self._sent) + len(sent) & 0xFFFF), words))
             sent += part
         return calls, sent
