@@ -110,7 +110,6 @@ def hostile(board, seed, ticks):
 def frames(trace, board):
     """{tick: bytes of the link}: HELLO, telemetry in every tick, the trace's requests, the log at its end, and a living host."""
     key = session_key(BOOT_ID, 1)
-    number = 0
     found = {0: encode("HELLO", 1, (2, 2, 1))}
     columns = ALL_COLUMNS if board.BUBBLES < 10 else MOST_COLUMNS
     requests = [[1, "SUBSCRIBE_FIELDS", [1, columns], []], *trace["requests"]]
@@ -118,8 +117,8 @@ def frames(trace, board):
     for tick in range(0, trace["ticks"], ALIVE_TICKS):
         if not any(first <= tick < end for first, end in trace.get("silent", [])):
             found[tick] = found.get(tick, b"") + encode("PING", 7, (0,), (), key)
-    for tick, name, fixed, repeated in sorted(requests, key=lambda request: request[0]):
-        number += 1
+    requests.sort(key=lambda request: request[0])
+    for number, (tick, name, fixed, repeated) in enumerate(requests, 1):
         found[tick] = found.get(tick, b"") + encode(name, number, fixed, repeated, key)
     return found
 
