@@ -12,7 +12,9 @@ import importlib.util
 import json
 import zlib
 from array import array
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,8 +48,26 @@ class Recorder:
         self.firmware.close()
 
 
-def record(name, board, seconds, requests, faults=(), spread=0.0, seed=0, silent=(), pump_fails=None):
-    """One trace. Times are s: requests (time, name, fixed, repeated), faults (time, name, bubble, value), silent (from, to)."""
+class Scenario(NamedTuple):
+    """What happens to a simulated board. Times are in s."""
+
+    name: str
+    board: str
+    seconds: float
+    requests: Iterable
+    """(time, name, fixed, repeated)."""
+    faults: Sequence = ()
+    """(time, name, bubble, value)."""
+    spread: float = 0.0
+    seed: int = 0
+    silent: Sequence = ()
+    """(from, to) when the host says nothing."""
+    pump_fails: float | None = None
+
+
+def record(scenario):
+    """The trace of a scenario."""
+    name, board, seconds, requests, faults, spread, seed, silent, pump_fails = scenario
     simulated = SimulatedBoard(board, seed=seed, spread=spread)
     simulated.firmware = recorder = Recorder(InProcessFirmware(simulated.data, golden.BOOT_ID))
     tick_s = simulated.tick_s
@@ -137,33 +157,33 @@ def tables(n):
     yield show(4.6, [9500] * n)
 
 
-def traces():
-    """All traces, without digests."""
+def situations():
+    """All situations: scenarios for a plant, and traces that need none."""
     for board, n in (("wristband7", 7), ("wristband19", 19)):
-        yield record(f"{n} ideal", board, 5.5, motions(n, 1))
+        yield Scenario(f"{n} ideal", board, 5.5, motions(n, 1))
         for seed in (1, 2):
-            yield record(f"{n} spread {seed}", board, 5.5, motions(n, 10 + seed), spread=0.1, seed=seed)
-        yield record(f"{n} sequence", board, 5.0, sequence(n), spread=0.1, seed=3)
-        yield record(f"{n} tables", board, 6.0, tables(n), spread=0.05, seed=4)
+            yield Scenario(f"{n} spread {seed}", board, 5.5, motions(n, 10 + seed), spread=0.1, seed=seed)
+        yield Scenario(f"{n} sequence", board, 5.0, sequence(n), spread=0.1, seed=3)
+        yield Scenario(f"{n} tables", board, 6.0, tables(n), spread=0.05, seed=4)
         hold = [show(0.1, np.linspace(8000, 12000, n)), show(2.0, np.linspace(12000, 8000, n)), (3.0, "CLEAR", [], [])]
         hold += [show(3.2, np.linspace(13000, 9000, n)), (4.5, "VENT", [], [])]
         kinds = [("leak", 4e-7), ("pop_off", 1.0), ("fill_stuck", 1.0), ("fill_stuck", -1.0), ("vent_stuck", 1.0)]
         kinds += [("vent_stuck", -1.0), ("sensor_stuck", 1900.0), ("sensor_absent", 1.0), ("sensor_bias", 9000.0)]
         at_hold = [(1.0 + 0.03 * k, *kinds[k % 9][:1], k, kinds[k % 9][1]) for k in range(n)]
-        yield record(f"{n} faults while holding", board, 6.0, hold, at_hold, spread=0.1, seed=5)
+        yield Scenario(f"{n} faults while holding", board, 6.0, hold, at_hold, spread=0.1, seed=5)
         moving = [(2.05 + 0.02 * k, kinds[(k + 3) % 9][0], k, kinds[(k + 3) % 9][1]) for k in range(n)]
         gone = [(2.9, kinds[(k + 3) % 9][0], k, 0.0) for k in range(n)]
-        yield record(f"{n} faults while moving", board, 6.0, hold, moving + gone, spread=0.1, seed=6)
+        yield Scenario(f"{n} faults while moving", board, 6.0, hold, moving + gone, spread=0.1, seed=6)
         alone = [(1.0, "fill_stuck", 2, 1.0), (1.2, "leak", 0, 5e-8)]
-        yield record(f"{n} overfilled", board, 4.0, [*hold[:1], (1.5, "VENT", [], [])], alone, seed=7)
+        yield Scenario(f"{n} overfilled", board, 4.0, [*hold[:1], (1.5, "VENT", [], [])], alone, seed=7)
         far = [
             (0.0, "SETTING_WRITE", [], [[settings.BUDGET_KPA_S, 10]]),
             show(0.1, [13000] * n),
             (3.0, "CLEAR", [], []),
         ]
-        yield record(f"{n} budget", board, 4.0, far, seed=8)
-        yield record(f"{n} supply fails", board, 5.0, hold[:2], pump_fails=0.8, seed=9)
-        yield record(f"{n} host silent", board, 4.0, hold[:1], silent=[(0.4, 2.5)], seed=10)
+        yield Scenario(f"{n} budget", board, 4.0, far, seed=8)
+        yield Scenario(f"{n} supply fails", board, 5.0, hold[:2], pump_fails=0.8, seed=9)
+        yield Scenario(f"{n} host silent", board, 4.0, hold[:1], silent=[(0.4, 2.5)], seed=10)
     for board in ("wristband7", "wristband19"):
         for seed in (1, 2, 3):
             yield {
@@ -178,7 +198,11 @@ def traces():
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--digests", action="store_true", help="keep counts and requests; write the digests anew")
-    found = golden.TRACES if parser.parse_args().digests else list(traces())
+    found = (
+        golden.TRACES
+        if parser.parse_args().digests
+        else [record(one) if isinstance(one, Scenario) else one for one in situations()]
+    )
     for trace in found:
         trace["digests"], _ = golden.replay(trace, InProcessFirmware(boards.load(trace["board"]), golden.BOOT_ID))
     golden.PATH.write_text("[\n" + ",\n".join(json.dumps(trace) for trace in found) + "\n]\n", encoding="utf-8")

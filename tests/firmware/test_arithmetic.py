@@ -29,7 +29,7 @@ def test_every_place_of_the_state_has_one_name():
     names = names_of(layout)
     places = dict(names)
     order = [name for name, _ in names]
-    for first, size in (("SENSOR_ZERO", "ROW_WORDS"), ("KNOT_HEIGHT", "KNOT_WORDS"), ("BUBBLES", "BOARD_WORDS")):
+    for first, size in (("SENSOR_ZERO", "ROW_WORDS"), ("KNOT_HEIGHT", "KNOT_WORDS"), ("BUBBLE_COUNT", "BOARD_WORDS")):
         record = order[order.index(first) : order.index(size) + 1]
         assert [places[name] for name in record] == list(range(len(record)))
     assert layout.ROOTS == layout.BOARD_WORDS

@@ -37,7 +37,7 @@ _HIGHEST_PRESSURE = const(38)
 _ROW_WORDS = const(41)
 _KNOT_AIR = const(1)
 _KNOT_WORDS = const(5)
-_BUBBLES = const(0)
+_BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _PA_PER_COUNT = const(2)
 _COUNT_LOW = const(3)
@@ -126,7 +126,7 @@ class Bubbles:
 
     def _take_up_board(self, board):
         state = self.state
-        state[_BUBBLES] = self.count
+        state[_BUBBLE_COUNT] = self.count
         state[_TICK_US] = board.TICK_US
         state[_PA_PER_COUNT] = board.SENSOR_PA_PER_COUNT
         state[_COUNT_LOW] = board.COUNT_LOW

@@ -62,7 +62,7 @@ KNOT_RECIPROCAL = const(4)  # of the slope, 2^28/slope
 KNOT_WORDS = const(5)
 
 # The board's numbers.
-BUBBLES = const(0)
+BUBBLE_COUNT = const(0)
 TICK_US = const(1)
 PA_PER_COUNT = const(2)
 COUNT_LOW = const(3)

@@ -73,7 +73,7 @@ _KNOT_PRESSURE = const(2)
 _KNOT_SLOPE = const(3)
 _KNOT_RECIPROCAL = const(4)
 _KNOT_WORDS = const(5)
-_BUBBLES = const(0)
+_BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _PA_PER_COUNT = const(2)
 _COUNT_LOW = const(3)
@@ -128,7 +128,7 @@ _ROOT_END = const(8191)  # the last place in a table of roots, *128
 @micropython.viper
 def step(row: ptr32, board: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int):
     """One tick of all bubbles: counts of their sensors in, `pulses` out, fill and vent µs of each in the next period."""
-    n = board[_BUBBLES]
+    n = board[_BUBBLE_COUNT]
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
     tick = board[_TICK_US]
     same = 1 if mode == board[_CONTROL_MODE] else 0

@@ -37,7 +37,7 @@ def set_targets(row: ptr32, heights: ptr32, at: int, n: int):
 
 
 @micropython.viper
-def set_next_targets(row: ptr32, heights: ptr16, at: int, n: int, from_height: int, rest: int):
+def set_next_targets(row: ptr32, heights: ptr16, at: int, n: int, from_height: int, rest_um: int):
     """Begin the way to the targets (µm) in `heights[at:]`; a bubble whose target is LEAVE keeps the one that it has.
 
     It begins where the setpoint is, so that a ramp follows another without a step, or at the estimated height.
@@ -46,7 +46,7 @@ def set_next_targets(row: ptr32, heights: ptr16, at: int, n: int, from_height: i
         row[_RAMP_START] = (row[_HEIGHT] if from_height else row[_SETPOINT]) >> 4
         target = heights[at]
         if target != _LEAVE:
-            row[_TARGET] = target if target > rest else rest  # lower would be the end of the ramp before its time
+            row[_TARGET] = target if target > rest_um else rest_um  # lower would be the end of the ramp before its time
         row[_QUIESCENT] = 0
         row[_HOLD_OUTPUT] = 0
         row[_RAMPING] = 1
@@ -82,13 +82,13 @@ def retract(row: ptr32, height: int, n: int):
 
 
 @micropython.viper
-def unsettled(row: ptr32, n: int, tolerance: int, rest: int) -> int:
+def unsettled(row: ptr32, n: int, tolerance: int, rest_um: int) -> int:
     """The bubbles, as bits, whose height is further than `tolerance` µm from the target, or not yet measured."""
     bits = 0
     bit = 1
     while n > 0:
         target = row[_TARGET]
-        off = (target if target > rest else rest) - (row[_HEIGHT] >> 4)
+        off = (target if target > rest_um else rest_um) - (row[_HEIGHT] >> 4)
         known = 1 if row[_SAMPLES] > 1 or row[_STATUS] == _RESTING else 0
         if off > tolerance or off < 0 - tolerance or known == 0 or row[_FAULTS]:
             bits |= bit
