@@ -14,6 +14,7 @@ from bubble_firmware.drivers.flash import SECTOR, Memory
 from bubble_protocol.frame import copy
 
 LINK_IN = 256
+"""Bytes of the link that the firmware takes in one tick."""
 LINK_OUT = 1024
 LISTEN_ONLY = 0x8000
 RESET = 0xFF

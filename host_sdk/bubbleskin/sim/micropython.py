@@ -13,7 +13,7 @@ import bubble_firmware
 import bubble_protocol
 from bubble_firmware.hal.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
 from bubbleskin.errors import LinkError
-from bubbleskin.sim.board import Outputs
+from bubbleskin.sim.firmware import Outputs
 from bubbleskin.toolchain.interpreter import find_micropython
 
 HEAP = "448k"
