@@ -10,7 +10,8 @@ from bubbleskin.link.clock import Clock
 
 PING = 0.1
 """Seconds between two pings, and up to a tick more by chance: else all could wait for their tick equally long."""
-TICK = 0.005
+DEVICE_TICK = 0.005
+"""s."""
 AGES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
 """Lengths of the ping history at which the clock is asked, s; after the last of them at every tenth ping."""
 TARGET = 1e-3
@@ -84,17 +85,17 @@ def history(
     rng = np.random.default_rng(seed)
     device = Device(rng)
     now = 0.0
-    clock = Clock(TICK, lambda: now)
+    clock = Clock(DEVICE_TICK, lambda: now)
     n = int(seconds / PING)
     out, back = law(rng, n)
     asked = []
     for k in range(n):
-        sent = max(k * PING + rng.uniform(0, TICK), now)  # The next ping waits for the one before.
+        sent = max(k * PING + rng.uniform(0, DEVICE_TICK), now)  # The next ping waits for the one before.
         handled = sent + out[k]
         if reads_every:
             handled += -device.at(handled) % reads_every
         now = handled + back[k]
-        ticks, rest = divmod(device.at(handled), TICK)
+        ticks, rest = divmod(device.at(handled), DEVICE_TICK)
         clock.observe(sent, now, int(ticks) % (1 << 32), int(rest * 1e6))
         for age in AGES:
             if sent <= age < sent + PING or (age == AGES[-1] and sent > age and k % 10 == 0):
@@ -108,7 +109,7 @@ def rows(size: float = 1.0) -> Iterator[Row]:
     seeds = range(share_of(_SEEDS, size))
     seconds = max(_SECONDS * min(1.0, size * _SEEDS), _LEAST_SECONDS)
     for name, law in LAWS.items():
-        for reads_every in (0.0, TICK):
+        for reads_every in (0.0, DEVICE_TICK):
             asked = np.array(
                 [a for seed in seeds for a in history(law, seed, reads_every=reads_every, seconds=seconds)]
             )

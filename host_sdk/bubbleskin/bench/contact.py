@@ -7,13 +7,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.bench.rows import Row, fastest, share_of
+from bubbleskin.bench.rows import REPEATS, Row, fastest, share_of
 from bubbleskin.contact.model import CompliantContact
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
 from bubbleskin.planner.search import plan
 
-_REPEATS = 3
 _SEED = 1
 _RINGS = ((1, "< 0.1"), (2, "< 0.5"), (3, ""), (4, ""), (5, ""))
 """Hexagons that are followed, 7 to 91 bubbles, and their targets in s."""
@@ -25,7 +24,7 @@ _PLANS = ((1, 20, "< 1"), (2, 10, "< 10"))
 
 def rows(size: float = 1.0) -> Iterator[Row]:
     """Paths of 25 increments for 7 to 91 bubbles, plans for 7 and 19."""
-    repeats = share_of(_REPEATS, size)
+    repeats = share_of(REPEATS, size)
     hexagons = _RINGS[: max(2, share_of(len(_RINGS), size))]
     yield from _paths(hexagons, repeats)
     yield _pressed(hexagons[-1][0], repeats)

@@ -5,17 +5,16 @@ from functools import partial
 
 import numpy as np
 
-from bubbleskin.bench.rows import Row, fastest, share_of
+from bubbleskin.bench.rows import REPEATS, Row, fastest, share_of
 from bubbleskin.membrane import YeohBalloon, build_table, fit_sheet, simulate_sheet
 
-_REPEATS = 3
 _PRESSURES = 100_000
 _TABLES = 19
 
 
 def rows(size: float = 1.0) -> Iterator[Row]:
     """All branches of 10⁵ pressures, 19 tables, and the fit of a sheet of seven bubbles."""
-    repeats = share_of(_REPEATS, size)
+    repeats = share_of(REPEATS, size)
     yield from _inversions(share_of(_PRESSURES, size), repeats)
     yield _tables(share_of(_TABLES, size), repeats)
     yield _fit(repeats)

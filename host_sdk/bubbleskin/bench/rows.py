@@ -8,6 +8,9 @@ import numpy as np
 
 _T = TypeVar("_T")
 
+REPEATS = 3
+"""Of what is timed, at full size."""
+
 
 class Row(NamedTuple):
     """What was measured, its value and unit, and the target as text, empty where there is none."""

@@ -27,7 +27,7 @@ INCREMENTS = 25
 """Increments of one step of pressures, before any is halved."""
 TRUST = 0.3e-3
 """m. Longest single Newton step of a bubble: short enough to stay in the valley that it is in."""
-TOLERANCE = 1e-7
+FORCE_TOLERANCE = 1e-7
 """N. Largest force left on any coordinate; against the softest spring that is 10 nm."""
 LIMIT = 400
 """Newton steps of one relaxation."""
@@ -161,7 +161,7 @@ class PathFollower:
         for _ in range(8):
             state = begin.copy()
             self.ended, self._residual, steps, _ = relax(
-                state, pressure, self.bubbles, self.springs, self.pairs, TRUST, TOLERANCE, self._trace
+                state, pressure, self.bubbles, self.springs, self.pairs, TRUST, FORCE_TOLERANCE, self._trace
             )
             self._radius, aside, distance = extent(state, self.state, self.bubbles)
             if aside <= self._leeway and 2 * (self._radius + aside) <= self._reach:
