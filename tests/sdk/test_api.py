@@ -91,3 +91,5 @@ def test_what_the_host_makes_reads_at_a_prompt(tmp_path):
     assert repr(contact) == "<CompliantContact of 7 bubbles>"
     assert repr(bs.RigidContact(layout)) == "<RigidContact of 7 bubbles>"
     assert repr(shape).startswith("<Shape of 7 bubbles, 5.")
+    plan = bs.plan(np.full(7, 8.0), layout, contact=contact)
+    assert repr(plan).startswith("<Plan for 7 bubbles: 1 steps, all within reach, off by 0.")

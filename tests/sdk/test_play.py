@@ -139,7 +139,7 @@ def test_a_stream_that_runs_dry_is_a_fault_that_is_named(narrow):
     held = [0.0]
 
     def hold_up(playing):
-        if playing.played == 5:
+        if playing.begun_steps == 5:
             held[0] = skin.simulated.time + 1.0
 
     with pytest.raises(bs.DeviceFault, match=r"ran dry after step \d+: .* The last shape is held"):

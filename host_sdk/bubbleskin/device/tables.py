@@ -9,14 +9,13 @@ from bubbleskin.device.info import Info
 from bubbleskin.errors import DeviceRefused, InvalidInput
 from bubbleskin.link.link import Call, Link
 from bubbleskin.link.message import crc32
+from bubbleskin.link.upload import upload as send
 
 if TYPE_CHECKING:  # the membrane loads scipy, for which a script that only shows heights need not wait
     from bubbleskin.membrane.calibration import Calibration
     from bubbleskin.membrane.table import Table
 
 _KNOTS_PER_MESSAGE = 48
-_TOGETHER = 8
-"""Messages on their way at once: each has as long as any other call."""
 
 
 def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) -> "list[Table]":
@@ -36,9 +35,7 @@ def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) 
 async def upload(link: Link, tables: "Sequence[Table]") -> None:
     """Send a table for each bubble and let the device use them: all of them, or those it had."""
     data = [table.to_bytes() for table in tables]
-    calls = [call for bubble, table in enumerate(data) for call in _writes(bubble, table)]
-    for first in range(0, len(calls), _TOGETHER):
-        await link.calls(calls[first : first + _TOGETHER])
+    await send(link, (call for bubble, table in enumerate(data) for call in _writes(bubble, table)))
     crc = crc32(b"".join(data))
     reply = await link.call("TABLE_COMMIT", (crc,))
     if reply["tables_crc"] != crc:

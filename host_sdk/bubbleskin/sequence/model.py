@@ -149,10 +149,10 @@ class Sequence:
         order = np.argsort(times, kind="stable")
         before = np.full(self.bubbles, rest_mm)
         target, begin, length, step = before, 0.0, 0.0, None
-        order = self.unrolled()
+        coming = self.unrolled()
         for moment in order:
             time = times[moment]
-            while time >= begin + length and (index := next(order, None)) is not None:
+            while time >= begin + length and (index := next(coming, None)) is not None:
                 begin, before, step = round(begin + length, 3), target, self.each[index]
                 length = step.shortest
                 row = self._targets[index]

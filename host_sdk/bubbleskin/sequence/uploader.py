@@ -1,13 +1,14 @@
 """Brings a sequence's records to a device: all of them, or those of a stream as there is room for them."""
 
 import itertools
+from collections.abc import Iterator
 
 from bubbleskin.link.link import Call, Link
+from bubbleskin.link.message import Message
+from bubbleskin.link.upload import upload
 from bubbleskin.sequence.compile import Compiled
 
 _WORDS_PER_MESSAGE = 121
-_TOGETHER = 8
-"""Messages on their way at once: each has as long as any other call."""
 
 
 class Uploader:
@@ -44,23 +45,23 @@ class Uploader:
         if not self._free:
             self._free = (await self._link.call("SEQUENCE_STATE"))["free"]
         while self._free:
-            calls, sent = self._next_calls()
-            if not calls:
+            before = len(self._sent)
+            await upload(self._link, self._writes(), self._answered)
+            if len(self._sent) == before:
                 break
-            replies = await self._link.calls(calls)
-            self._sent += sent
-            self._free = replies[-1]["free"]
         self.unsent = self.total == 0 or len(self._sent) < self.total
 
-    def _next_calls(self) -> tuple[list[Call], list[int]]:
-        """As many messages as go together and have room, and the records in them."""
-        calls: list[Call] = []
-        sent: list[int] = []
-        while len(calls) < _TOGETHER:
-            part = list(itertools.islice(self._order, min(self._per_message, self._free - len(sent))))
+    def _writes(self) -> Iterator[Call]:
+        """Messages with the next records, as many as the memory has room for by what the device has said of it."""
+        while self._free:
+            part = list(itertools.islice(self._order, min(self._per_message, self._free)))
             if not part:
-                break
+                return
             words = self.compiled.records[part].reshape(-1, 1).tolist()
-            calls.append(("SEQUENCE_WRITE", (self.id, len(self._sent) + len(sent) & 0xFFFF), words))
-            sent += part
-        return calls, sent
+            first = len(self._sent) & 0xFFFF
+            self._sent += part
+            self._free -= len(part)
+            yield "SEQUENCE_WRITE", (self.id, first), words
+
+    def _answered(self, replies: list[Message]) -> None:
+        self._free = replies[-1]["free"]
