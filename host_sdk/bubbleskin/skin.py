@@ -13,10 +13,9 @@ from bubbleskin.device.records import Health, Info, State, TickHistogram
 from bubbleskin.device.stored import StoreInfo, Trim
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.link.clock import Clock
+from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link, run_sync
 from bubbleskin.link.message import Message, crc32
-from bubbleskin.link.synchronise import PINGS, ping
 from bubbleskin.link.transport import Transport
 from bubbleskin.sequence.model import Playable
 from bubbleskin.sequence.player import Played, Player, Playing, Progress
@@ -152,7 +151,7 @@ class AsyncSkin:
 
     async def synchronise(self, pings: int = PINGS) -> Clock:
         """Send pings at once, for the clock to begin with; returns it."""
-        await ping(self._link, self.clock, pings)
+        await self._link.send_pings(pings)
         return self.clock
 
     async def play(

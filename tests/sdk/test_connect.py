@@ -20,7 +20,7 @@ from bubble_protocol.frame import FRAME_MAX
 from bubble_protocol.schema import errors
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.message import encode
-from bubbleskin.link.transport import USB_IDS
+from bubbleskin.link.serial import USB_IDS
 from bubbleskin.sim.serve import PtyEnd
 from bubbleskin.skin import AsyncSkin
 

@@ -114,7 +114,7 @@ def test_a_late_reply_answers_no_other_request(scripted):
     link = Link(scripted(answer), 1.0)
     for token in range(30):
         assert run_sync(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
-    link._window._next = 0x10000
+    link.window.next_number = 0x10000
     for token in range(100, 129):
         late.clear()
         assert run_sync(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
