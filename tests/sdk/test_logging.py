@@ -8,7 +8,7 @@ import pytest
 
 import bubbleskin as bs
 from bubbleskin.cli.main import main
-from bubbleskin.link.link import run_sync
+from bubbleskin.link.link import Link, run_sync
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
 
@@ -56,18 +56,19 @@ def test_what_is_sent_again_is_told(tapped, caplog):
     assert not told(caplog, logging.DEBUG), "no frames"
 
 
-def test_a_restart_and_a_new_session_are_told(tapped, caplog):
-    skin, _ = tapped()
+def test_a_restart_and_a_new_session_are_told(caplog):
+    board = SimulatedBoard("wristband7")
+    link = Link(SimulatedTransport(board, "sim"), 2.0)
+    before = run_sync(link.hello())["boot_id"]
     with caplog.at_level(logging.INFO, "bubbleskin.link"):
-        before = skin.info.boot_id
-        skin.simulated.reset()
+        board.reset()
         with pytest.raises(bs.DeviceRestarted):
-            skin.state()
+            run_sync(link.call("STATE"))
         (line,) = told(caplog, logging.INFO, "the device has restarted")
         assert f"{before:08x}" in line
-        assert f"{skin.info.boot_id:08x}" in line
-        run_sync(skin.link.hello())
-    assert told(caplog, logging.INFO, "is open")
+        assert not told(caplog, logging.INFO, "is open")
+        run_sync(link.hello())
+    assert told(caplog, logging.INFO, f"session {link.session:08x} is open")
 
 
 class Unplugged(SimulatedTransport):

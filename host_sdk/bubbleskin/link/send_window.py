@@ -185,7 +185,7 @@ class SendWindow:
         request.resent = now
         request.due = now + request.patience
         if request.sends > 1:
-            _log.info("%s %d is sent again, for the %d. time", request.name, request.number, request.sends)
+            _log.info("%s %d is sent again, %d times so far", request.name, request.number & 0xFFFF, request.sends)
         if _log.isEnabledFor(logging.DEBUG):
             _log.debug("sent %s %d, %d bytes", request.name, request.number & 0xFFFF, len(request.frame))
         return request.frame
