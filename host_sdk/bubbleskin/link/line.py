@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import time
+import weakref
 from collections.abc import Callable
 
 from bubbleskin.errors import LinkError
@@ -16,7 +17,7 @@ SLICE = 0.02
 
 
 class Line:
-    """Bytes to and from `transport`; `take(data)` is called with all that comes.
+    """Bytes to and from `transport`; the method `take(data)` is called with all that comes.
 
     Without an event loop the transport is read in place and nothing here suspends. With one, other tasks have their
     turn while this one waits: a transport that waits by the wall clock is read in a thread.
@@ -28,7 +29,9 @@ class Line:
         """Why the port has gone; None while it is there."""
         self.keep = False
         """Whether a port that goes is waited for; otherwise its error is raised."""
-        self._take = take
+        self._taker = weakref.WeakMethod(
+            take
+        )  # no circle: a link that nobody holds is gone at once, and its port with it
         self._event_loop = event_loop
         self._reading = asyncio.Lock()
         self._thread: asyncio.Future[None] | None = None
@@ -85,6 +88,10 @@ class Line:
             raise problem
         self.lost = problem
         _log.info("%s is lost and waited for: %s", self.transport.name, problem)
+
+    def _take(self, data: bytes) -> None:
+        if take := self._taker():
+            take(data)
 
     async def _pause(self, seconds: float) -> None:
         if self._event_loop:
