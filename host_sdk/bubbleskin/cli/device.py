@@ -143,7 +143,7 @@ def show(
     if path is not None:
         asked = shapes.load(path)
     elif everywhere is None:
-        asked = shapes.numbers(heights)
+        asked = shapes.parse_heights(heights)
     with connect(device) as skin:
         if shape:
             asked = shapes.SHAPES[shape](skin.layout)

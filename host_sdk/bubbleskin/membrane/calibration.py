@@ -1,7 +1,7 @@
 """The calibration of one wristband: a table per bubble, in a text file that a person can read and diff.
 
 The file is TOML. Every knot has its own line, so a diff shows which height moved by how many Pa; the
-constants behind each table are kept beside it, with their units and where they come from. The CRC-32 over
+constants behind each table stand beside it, with their units and where they come from. The CRC-32 over
 all tables is the one that the firmware reports.
 """
 

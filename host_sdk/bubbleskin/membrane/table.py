@@ -13,11 +13,11 @@ from bubbleskin.membrane.balloon import YeohBalloon
 from bubbleskin.membrane.checks import finite
 
 MAX_KNOTS = 64
-MAX_PRESSURE = 0xFFFF  # Pa, an unsigned 16-bit knot
-MAX_HEIGHT = 0xFFFF  # µm
+MAX_PRESSURE, MAX_HEIGHT = 0xFFFF, 0xFFFF
+"""Pa and µm: a knot is two unsigned 16-bit numbers."""
 
-PRESSURE_TOLERANCE = 2.0  # Pa; the looser of the two holds at every height
-HEIGHT_TOLERANCE = 5.0  # µm
+PRESSURE_TOLERANCE, HEIGHT_TOLERANCE = 2.0, 5.0
+"""Pa and µm: the looser of the two holds at every height."""
 
 
 class TableError(NamedTuple):
@@ -91,7 +91,7 @@ class Table:
     def __len__(self) -> int:
         return int(self.height_um.size)
 
-    # What the firmware computes.
+    # What the firmware computes from it.
 
     def pressure_at(self, height_um: Any) -> Any:
         """Pressure (Pa) at a height (µm), in integers: p0 + (p1 − p0)(h − h0) // (h1 − h0), floored.
