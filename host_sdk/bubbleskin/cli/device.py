@@ -13,7 +13,7 @@ from rich.table import Table
 from bubbleskin.cli.options import as_json, device
 from bubbleskin.connect import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
-from bubbleskin.device.records import State
+from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
 from bubbleskin.shape import shapes
 from bubbleskin.shape.heightfield import Heights

@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from bubbleskin.checks import Numbers, finite, like, number, one_of, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane import wall as walls
 from bubbleskin.membrane.branches import MonotonePieces
-from bubbleskin.membrane.checks import finite, like, number, one_of, positive
 
 ATMOSPHERE = 101_325.0
 """Standard ambient pressure in Pa; gauge pressures are above it."""
@@ -197,36 +198,36 @@ class YeohBalloon:
 
     # Functions of the state.
 
-    def pressure(self, stretch: Any) -> Any:
+    def pressure(self, stretch: Numbers) -> Numbers:
         """Gauge pressure (Pa) in equilibrium at ``stretch`` (> 0; below 1 it is suction). Paper, Eq. 7."""
         return like(stretch, self._pressure(self._stretch(stretch)))
 
-    def slope(self, stretch: Any) -> Any:
+    def slope(self, stretch: Numbers) -> Numbers:
         """dP/dλ (Pa) at ``stretch``: positive where a pressure-controlled bubble is stable."""
         return like(stretch, self._slope(self._stretch(stretch)))
 
-    def compliance(self, stretch: Any) -> Any:
+    def compliance(self, stretch: Numbers) -> Numbers:
         """dh/dP (m/Pa; 1e-6 m/Pa is 1 mm/kPa) at ``stretch``; unbounded at a limit point."""
         x = self._stretch(stretch)
         with np.errstate(divide="ignore"):
             return like(stretch, self._height_slope(x) / self._slope(x))
 
-    def volume(self, stretch: Any) -> Any:
+    def volume(self, stretch: Numbers) -> Numbers:
         """Enclosed air (m³) at ``stretch``: 4/3 π r³, of the inner surface if the wall is thick."""
         inner, _ = self._current_radii(self._stretch(stretch))
         return like(stretch, 4 / 3 * math.pi * inner**3)
 
-    def energy(self, stretch: Any) -> Any:
+    def energy(self, stretch: Numbers) -> Numbers:
         """Strain energy (J) of the whole wall at ``stretch``; dU/dV is the pressure."""
         x = self._stretch(stretch)
         return like(stretch, walls.energy(x, *self._arguments))
 
-    def height(self, stretch: Any) -> Any:
+    def height(self, stretch: Numbers) -> Numbers:
         """Height above the base plane (m): the outer diameter of the sphere that sits on it."""
         _, outer = self._current_radii(self._stretch(stretch))
         return like(stretch, 2 * outer)
 
-    def stretch_at_height(self, height: Any) -> Any:
+    def stretch_at_height(self, height: Numbers) -> Numbers:
         """Stretch of the named surface when the bubble is ``height`` (m) tall, from the rest height up."""
         h = positive("height", height, "m")
         if np.any(h < self.rest_height * (1 - 1e-9)):
@@ -236,11 +237,19 @@ class YeohBalloon:
             )
         return like(height, walls.stretch_of_outer(h / 2, *self._sizes))
 
-    def pressure_at_height(self, height: Any) -> Any:
+    def pressure_at_height(self, height: Numbers) -> Numbers:
         """Gauge pressure (Pa) that holds the bubble at ``height`` (m). Always single valued."""
         return like(height, self._pressure(np.asarray(self.stretch_at_height(height))))
 
-    def is_stable(self, stretch: Any, *, line_volume: float = math.inf, polytropic: float = 1.0) -> Any:
+    @overload
+    def is_stable(self, stretch: float, *, line_volume: float = math.inf, polytropic: float = 1.0) -> bool: ...
+    @overload
+    def is_stable(
+        self, stretch: NDArray[np.float64], *, line_volume: float = math.inf, polytropic: float = 1.0
+    ) -> NDArray[np.bool_]: ...
+    def is_stable(
+        self, stretch: ArrayLike, *, line_volume: float = math.inf, polytropic: float = 1.0
+    ) -> bool | NDArray[np.bool_]:
         """Whether the state stays where it is when nudged.
 
         By default behind a pressure regulator: stable where dP/dλ > 0. With a finite ``line_volume`` (m³)
@@ -257,7 +266,7 @@ class YeohBalloon:
 
     # Functions of the pressure: as many answers as there are branches.
 
-    def stretches(self, pressure: Any) -> Any:
+    def stretches(self, pressure: ArrayLike) -> NDArray[np.float64]:
         """All stretches ≥ 1 in equilibrium at ``pressure`` (Pa, gauge), ascending.
 
         A scalar gives a 1-D array with one entry per branch (1 to 3). An array of shape s gives s + (k,),
@@ -279,7 +288,7 @@ class YeohBalloon:
         found = pieces.solve(np.atleast_1d(p))
         return found[0][~np.isnan(found[0])] if np.ndim(pressure) == 0 else found
 
-    def heights(self, pressure: Any) -> Any:
+    def heights(self, pressure: ArrayLike) -> NDArray[np.float64]:
         """All heights (m) in equilibrium at ``pressure``, ascending; else as :meth:`stretches`."""
         _, outer = self._current_radii(self.stretches(pressure))
         return 2 * outer

@@ -49,6 +49,9 @@ class Calibration:
         tables = (build_table(balloon, height_mm=height_mm, knots=knots) for balloon in balloons)
         return cls(board, tuple(tables), source)
 
+    def __repr__(self) -> str:
+        return f"<Calibration of a {self.board}: {len(self.tables)} tables, CRC-32 {self.crc32:08x}>"
+
     @property
     def crc32(self) -> int:
         """CRC-32 of all tables' bytes one after the other, as the firmware computes it."""

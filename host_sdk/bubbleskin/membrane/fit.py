@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
+from bubbleskin.checks import Numbers, finite, like, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon
-from bubbleskin.membrane.checks import finite, like, positive
 from bubbleskin.membrane.regression import Dimensions, Points, Solution, regress
 
 HEIGHT_SD = 0.05e-3
@@ -96,6 +96,10 @@ class YeohFit:
         """The fitted balloon in a list, as a sheet's fit has several."""
         return [self.balloon]
 
+    def __repr__(self) -> str:
+        mu, c2, c3 = self.parameters
+        return f"<YeohFit of {self.residuals.size} points: mu {mu / 1e3:.4g} kPa, C2 {c2:.4g} Pa, C3 {c3:.4g} Pa>"
+
     def interval(self, level: float = 0.95) -> np.ndarray:
         """Confidence interval of each constant, (3, 2) in Pa; C3's is cut off at 0."""
         half = self._quantile(level) * np.sqrt(np.diag(self.covariance))
@@ -103,20 +107,20 @@ class YeohFit:
         ends[2] = np.maximum(ends[2], 0.0)
         return ends
 
-    def pressure_sd(self, height: Any) -> Any:
+    def pressure_sd(self, height: Numbers) -> Numbers:
         """Standard deviation (Pa) of the model's pressure at ``height`` (m)."""
         h = positive("height", height, "m")
         basis, _ = self.dimensions.basis(np.atleast_1d(h).ravel())
         sd = np.sqrt(np.einsum("ij,jk,ik->i", basis, self.covariance, basis)).reshape(np.shape(h))
         return like(height, sd)
 
-    def pressure_band(self, height: Any, level: float = 0.95) -> tuple[Any, Any]:
+    def pressure_band(self, height: Numbers, level: float = 0.95) -> tuple[Numbers, Numbers]:
         """Lowest and highest pressure (Pa) of the model at ``height`` (m) that the data allows."""
         middle = self.balloon.pressure_at_height(height)
         half = self._quantile(level) * self.pressure_sd(height)
         return middle - half, middle + half
 
-    def height_band(self, pressure: Any, level: float = 0.95, *, up_to: float = 0.0) -> tuple[Any, Any]:
+    def height_band(self, pressure: Numbers, level: float = 0.95, *, up_to: float = 0.0) -> tuple[Numbers, Numbers]:
         """Lowest and highest height (m) at ``pressure`` (Pa) that the data allows.
 
         All heights whose pressure band holds the pressure are allowed, so on a plateau, or across a snap,
