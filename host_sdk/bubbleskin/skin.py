@@ -9,6 +9,7 @@ import numpy as np
 
 from bubble_protocol.schema import sequences, system
 from bubbleskin.device import safety
+from bubbleskin.device.layout import find_layout
 from bubbleskin.device.records import Health, Info, State, TickHistogram
 from bubbleskin.device.stored import StoreInfo, Trim
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
@@ -66,12 +67,13 @@ class AsyncSkin:
         *,
         event_loop: bool = False,
         simulated: "SimulatedBoard | None" = None,
+        layout: Layout | None = None,
     ) -> Self:
-        """Greet the device at the other end of `transport`."""
+        """Greet the device at the other end of `transport`; `layout`: instead of the one that it tells."""
         link = Link(transport, timeout, event_loop=event_loop)
         try:
-            info = Info.of(await link.hello())
-            return cls(link, info, Layout.of_board(info.board, info.bubbles), simulated)
+            hello = await link.hello()
+            return cls(link, Info.of(hello), await find_layout(link, hello, layout), simulated)
         except BaseException:
             await link.close()
             raise

@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 from bubble_firmware.control import step
 from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.table import Tables
+from bubbleskin import boards
 from bubbleskin.bench import float_law
 from bubbleskin.bench.rows import Row
 from bubbleskin.bench.trace import Tick, record
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.link.link import run_sync
-from bubbleskin.sim.board import load_board
 from bubbleskin.sim.rp2040 import open_chip
 from bubbleskin.sim.rp2040.chip import CLOCK_HZ, Chip
 from bubbleskin.sim.rp2040.prompt import Prompt
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
-from bubbleskin.toolchain.rp2040 import BARE, firmware
+from bubbleskin.toolchain.frozen import BARE
+from bubbleskin.toolchain.rp2040 import firmware
 
 _US = CLOCK_HZ // 1_000_000  # cycles
 _PERIODS = {"wristband7": (2000, 40), "wristband19": (5000, 60)}  # µs, and the share of it that a tick may take, %
@@ -126,7 +127,7 @@ def _control_rows(board: str) -> Iterator[Row]:
 
 def curves(board: str) -> list[list[tuple[float, int, int]]]:
     """The curves of every bubble by the tables of `board`: knots of (height µm, air µJ, pressure Pa)."""
-    data = load_board(board)
+    data = boards.load(board)
     bubbles = Bubbles(data, Tables(data.BUBBLES))
     found = []
     for i in range(data.BUBBLES):

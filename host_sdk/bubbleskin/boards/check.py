@@ -1,8 +1,8 @@
 """Whether a board's file defines what firmware and simulator need, and what the hardware allows."""
 
 import re
-from itertools import combinations
-from math import hypot
+from itertools import combinations, pairwise
+from math import dist
 from types import ModuleType
 from typing import Any
 
@@ -47,11 +47,11 @@ def check(data: ModuleType, what: str, name: str | None = None) -> None:
         _check_valves(data)
         _check_chips(data, "CONVERTERS", range(30), "chip select and channels of each MCP3208")
         _check_pins(data)
-    except _Flaw as flaw:
+    except _FlawError as flaw:
         raise InvalidInput(f"{what} {flaw}.") from None
 
 
-class _Flaw(Exception):
+class _FlawError(Exception):
     pass
 
 
@@ -63,33 +63,35 @@ def _get(data: ModuleType, name: str, meaning: str) -> Any:
     try:
         return getattr(data, name)
     except AttributeError:
-        raise _Flaw(f"does not define {name}: {meaning}") from None
+        raise _FlawError(f"does not define {name}: {meaning}") from None
 
 
 def _check_name(data: ModuleType, name: str | None) -> None:
     found = _get(data, "NAME", "its name")
     if not isinstance(found, str) or not re.fullmatch(rf"[a-z][a-z0-9_]{{0,{NAME_BYTES - 1}}}", found):
-        raise _Flaw(
+        raise _FlawError(
             f"has NAME = {found!r}; a name is up to {NAME_BYTES} small letters, digits and underscores, a letter first"
         )
     if name is not None and found != name:
-        raise _Flaw(f"has NAME = {found!r}; a board is called as its file, here {name!r}")
+        raise _FlawError(f"has NAME = {found!r}; a board is called as its file, here {name!r}")
 
 
 def _check_number(data: ModuleType, field: Field) -> None:
     value = _get(data, field.name, f"{field.meaning}, {field.allowed_text} {field.unit}".rstrip())
     if not _is_whole(value):
-        raise _Flaw(f"has {field.name} = {value!r}; a whole number is wanted, {field.allowed_text} {field.unit}".rstrip())
+        raise _FlawError(
+            f"has {field.name} = {value!r}; a whole number is wanted, {field.allowed_text} {field.unit}".rstrip()
+        )
     if value not in field.allowed:
         unit = f" {field.unit}" if field.unit else ""
-        raise _Flaw(f"has {field.name} = {value}{unit} ({field.meaning}); {field.allowed_text}{unit} is allowed")
+        raise _FlawError(f"has {field.name} = {value}{unit} ({field.meaning}); {field.allowed_text}{unit} is allowed")
 
 
 def _check_rising(data: ModuleType, names: tuple[str, ...]) -> None:
-    for less, more in zip(names, names[1:], strict=False):
+    for less, more in pairwise(names):
         low, high = getattr(data, less), getattr(data, more)
         if low >= high:
-            raise _Flaw(f"has {less} = {low} and {more} = {high}; {less} must be the lesser")
+            raise _FlawError(f"has {less} = {low} and {more} = {high}; {less} must be the lesser")
 
 
 def _check_limits(data: ModuleType) -> None:
@@ -100,45 +102,48 @@ def _check_limits(data: ModuleType) -> None:
     ):
         reach = (data.COUNT_HIGH - getattr(data, zero)) * getattr(data, scale)
         if reach <= getattr(data, limit):
-            raise _Flaw(
+            raise _FlawError(
                 f"has {limit} = {getattr(data, limit)}, and its sensor is believed up to {reach} Pa only; "
                 f"lower {limit} or mend {zero} and {scale}"
             )
     needed = next(pressure for height, pressure in KNOTS if height >= data.HEIGHT_MAX_UM)
     if needed >= data.PRESSURE_MAX_PA:
-        raise _Flaw(
+        raise _FlawError(
             f"has PRESSURE_MAX_PA = {data.PRESSURE_MAX_PA}, and HEIGHT_MAX_UM = {data.HEIGHT_MAX_UM} takes {needed} Pa; "
             "lower the height or raise the pressure"
         )
     for name in ("VALVE_OPENS_US", "VALVE_CLOSES_US"):
         if getattr(data, name) > data.TICK_US // 2:
-            raise _Flaw(f"has {name} = {getattr(data, name)}; half of TICK_US, {data.TICK_US // 2} µs, is the most")
+            raise _FlawError(
+                f"has {name} = {getattr(data, name)}; half of TICK_US, {data.TICK_US // 2} µs, is the most"
+            )
 
 
 def _check_layout(data: ModuleType) -> None:
     layout = _get(data, "LAYOUT", "where its bubbles are, a pair (x, y) in µm for each")
     if not isinstance(layout, tuple) or not all(_is_pair(pair) for pair in layout):
-        raise _Flaw("has a LAYOUT that is not a tuple of pairs of whole numbers, (x, y) in µm for each bubble")
+        raise _FlawError("has a LAYOUT that is not a tuple of pairs of whole numbers, (x, y) in µm for each bubble")
     if len(layout) != data.BUBBLES:
-        raise _Flaw(f"has {len(layout)} pairs in LAYOUT and BUBBLES = {data.BUBBLES}; there must be a pair for each bubble")
+        raise _FlawError(
+            f"has {len(layout)} pairs in LAYOUT and BUBBLES = {data.BUBBLES}; there must be a pair for each bubble"
+        )
     far = [i for i, (x, y) in enumerate(layout) if max(abs(x), abs(y)) > _LAYOUT_MAX_UM]
     if far:
-        raise _Flaw(f"has bubble {far[0]} at {layout[far[0]]} µm in LAYOUT; {_LAYOUT_MAX_UM} µm from the middle is the most")
+        raise _FlawError(
+            f"has bubble {far[0]} at {layout[far[0]]} µm in LAYOUT; {_LAYOUT_MAX_UM} µm from the middle is the most"
+        )
     if data.BUBBLES == 1:
         return
-    gaps = {(i, j): hypot(layout[i][0] - layout[j][0], layout[i][1] - layout[j][1]) for i, j in _pairs(data.BUBBLES)}
-    (i, j), gap = min(gaps.items(), key=lambda item: item[1])
+    gap, i, j = min((dist(layout[i], layout[j]), i, j) for i, j in combinations(range(data.BUBBLES), 2))
     if gap < NEAREST * data.PITCH_UM:
-        raise _Flaw(
+        raise _FlawError(
             f"has bubbles {i} and {j} only {gap:.0f} µm from each other in LAYOUT; at least {NEAREST:g} of "
             f"PITCH_UM = {data.PITCH_UM} is wanted"
         )
     if gap >= NEIGHBOUR * data.PITCH_UM:
-        raise _Flaw(f"has no bubbles nearer to each other than {gap:.0f} µm in LAYOUT, and PITCH_UM = {data.PITCH_UM}: one is wrong")
-
-
-def _pairs(count: int) -> combinations[tuple[int, int]]:
-    return combinations(range(count), 2)
+        raise _FlawError(
+            f"has no bubbles nearer to each other than {gap:.0f} µm in LAYOUT, and PITCH_UM = {data.PITCH_UM}: mend one of them"
+        )
 
 
 def _is_pair(pair: object) -> bool:
@@ -149,7 +154,9 @@ def _check_valves(data: ModuleType) -> None:
     valves = _get(data, "VALVES", 'what drives its valves, "pwm" or "pca9685"')
     if valves == "pwm":
         if data.BUBBLES > PWM_BUBBLES:
-            raise _Flaw(f'has VALVES = "pwm" and {data.BUBBLES} bubbles; the chip has PWM for {PWM_BUBBLES}: use "pca9685"')
+            raise _FlawError(
+                f'has VALVES = "pwm" and {data.BUBBLES} bubbles; the chip has PWM for {PWM_BUBBLES}: use "pca9685"'
+            )
     elif valves == "pca9685":
         for field in EXPANDER_FIELDS:
             _check_number(data, field)
@@ -157,22 +164,24 @@ def _check_valves(data: ModuleType) -> None:
         try:
             clock.divider(_SYSTEM_MHZ, data.TICK_US, pca9685.CLOCKS)
         except ValueError:
-            raise _Flaw(f"has TICK_US = {data.TICK_US}; with PCA9685 it must be a multiple of 2000") from None
+            raise _FlawError(f"has TICK_US = {data.TICK_US}; with PCA9685 it must be a multiple of 2000") from None
     else:
-        raise _Flaw(f'has VALVES = {valves!r}; "pwm" and "pca9685" are known')
+        raise _FlawError(f'has VALVES = {valves!r}; "pwm" and "pca9685" are known')
 
 
 def _check_chips(data: ModuleType, name: str, keys: range, meaning: str) -> None:
     chips = _get(data, name, f"{meaning}, a pair for each")
     if not isinstance(chips, tuple) or not all(_is_pair(pair) for pair in chips):
-        raise _Flaw(f"has {name} = {chips!r}; a tuple of pairs is wanted: {meaning}")
+        raise _FlawError(f"has {name} = {chips!r}; a tuple of pairs is wanted: {meaning}")
     for key, bubbles in chips:
         if key not in keys or bubbles not in range(1, PER_CHIP + 1):
-            raise _Flaw(f"has ({key}, {bubbles}) in {name}; {keys[0]} to {keys[-1]} and 1 to {PER_CHIP} are allowed: {meaning}")
+            raise _FlawError(
+                f"has ({key}, {bubbles}) in {name}; {keys[0]} to {keys[-1]} and 1 to {PER_CHIP} are allowed: {meaning}"
+            )
     if len({key for key, _ in chips}) < len(chips):
-        raise _Flaw(f"names one chip twice in {name}: {meaning}")
+        raise _FlawError(f"names one chip twice in {name}: {meaning}")
     if sum(bubbles for _, bubbles in chips) != data.BUBBLES:
-        raise _Flaw(f"has {sum(bubbles for _, bubbles in chips)} bubbles in {name} and BUBBLES = {data.BUBBLES}")
+        raise _FlawError(f"has {sum(bubbles for _, bubbles in chips)} bubbles in {name} and BUBBLES = {data.BUBBLES}")
 
 
 def _check_pins(data: ModuleType) -> None:
@@ -186,7 +195,7 @@ def _check_pins(data: ModuleType) -> None:
     taken: dict[int, str] = {}
     for name, pin in uses:
         if pin not in GPIOS:
-            raise _Flaw(f"uses GPIO {pin} for {name}; a Raspberry Pi Pico does not hand it out")
+            raise _FlawError(f"uses GPIO {pin} for {name}; a Raspberry Pi Pico does not hand it out")
         if pin in taken:
-            raise _Flaw(f"uses GPIO {pin} twice, for {taken[pin]} and for {name}")
+            raise _FlawError(f"uses GPIO {pin} twice, for {taken[pin]} and for {name}")
         taken[pin] = name

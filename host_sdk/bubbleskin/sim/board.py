@@ -2,13 +2,14 @@
 
 import math
 from array import array
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bubble_firmware import boards
 from bubble_firmware.hal.lockstep import LINK_IN
+from bubbleskin import boards
 from bubbleskin.contact.model import CompliantContact
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
@@ -16,13 +17,11 @@ from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.plant import Plant, PlantParameters
 
-BOARDS = ("wristband7", "wristband19")
-
 
 class SimulatedBoard:
     """A simulated wristband in virtual time: it moves only when it is stepped, and the same calls give the same bytes.
 
-    `name`: wristband7 or wristband19. `seed`: of sensor noise and spread. `spread`: how much walls, valves and
+    `board`: its name, or the path of its file. `seed`: of sensor noise and spread. `spread`: how much walls, valves and
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
     reservoir starts full, as on a board that has been powered for a while. `contact`: whether bubbles push each
     other, as real ones do; without it each is alone, which shows what the control law itself does. `firmware`: what
@@ -31,7 +30,7 @@ class SimulatedBoard:
 
     def __init__(
         self,
-        name: str = "wristband7",
+        board: str | Path = boards.DEFAULT,
         *,
         seed: int = 0,
         spread: float = 0.0,
@@ -39,15 +38,15 @@ class SimulatedBoard:
         firmware: Firmware | None = None,
         flash: NorFlash | None = None,
     ):
-        self.data = load_board(name)
+        self.data = boards.load(board)
         if not (math.isfinite(spread) and 0 <= spread <= 0.5):
             raise InvalidInput(f"spread is {spread}; give a share from 0 to 0.5, such as 0.1 for ± 10 %.")
         if seed < 0:
             raise InvalidInput(f"seed is {seed}; give a whole number from 0.")
         n = self.data.BUBBLES
-        self.name = name
+        self.name: str = self.data.NAME
         self.tick_s: float = self.data.TICK_US * 1e-6
-        self.plant = make_plant(name, n, seed, spread, contact)
+        self.plant = make_plant(self.data, seed, spread, contact)
         self.firmware = firmware or InProcessFirmware(self.data, seed + 1, flash)
         self.to_device = bytearray()
         self.from_device = bytearray()
@@ -120,14 +119,9 @@ class SimulatedBoard:
         self.firmware.close()
 
 
-def make_plant(name: str, n: int, seed: int, spread: float, contact: bool) -> Plant:
-    """The bubbles of board `name`; the rest as of `SimulatedBoard`."""
+def make_plant(data: ModuleType, seed: int, spread: float, contact: bool) -> Plant:
+    """The bubbles of a board, where its layout says; the rest as of `SimulatedBoard`."""
+    n = data.BUBBLES
     parameters = PlantParameters.spread(n, spread, seed) if spread else PlantParameters.nominal(n)
-    return Plant(parameters, seed=seed, contact=CompliantContact(Layout.of_board(name, n)) if contact else None)
-
-
-def load_board(name: str) -> ModuleType:
-    """The data of a board that can be simulated."""
-    if name not in BOARDS:
-        raise InvalidInput(f"There is no board {name!r} to simulate; there are {' and '.join(BOARDS)}.")
-    return boards.load(name)
+    layout = Layout.from_um(data.LAYOUT, data.PITCH_UM)
+    return Plant(parameters, seed=seed, contact=CompliantContact(layout) if contact else None)

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from bubbleskin import boards
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.link.transport import Transport
-from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.faults import Faults, LossyTransport
 from bubbleskin.sim.flash import NorFlash
 
@@ -149,7 +150,10 @@ class Options:
 
 
 def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transport, Board]:
-    """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it."""
+    """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it.
+
+    `name`: a board's, or the path of a board's file.
+    """
     url = f"{scheme}://{name}"
     chosen = Options.parse(options, url)
     faults = Faults(drop=chosen.loss)  # refused before anything is started
@@ -158,7 +162,7 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transpo
 
 
 def _open(scheme: str, name: str, url: str, chosen: Options) -> tuple[SimulatedTransport, Board]:
-    data = load_board(name)
+    data = boards.load(name)  # refused before anything is started
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip
 

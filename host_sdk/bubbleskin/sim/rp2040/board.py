@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin import boards
 from bubbleskin.errors import InvalidInput, LinkError
-from bubbleskin.sim.board import load_board, make_plant
+from bubbleskin.sim.board import make_plant
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import Chip
 from bubbleskin.sim.rp2040.expanders import Pca9685Bank
@@ -25,7 +26,7 @@ FAULTS = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
 
 
 class Rp2040Board:
-    """The board `name`, running the UF2 at `firmware`; the names of `SimulatedBoard` mean the same here.
+    """The board called `board`, or of that file, running the UF2 at `firmware`; the names of `SimulatedBoard` mean the same here.
 
     Time is emulated time. `seed`, `spread` and `contact` are those of `SimulatedBoard`. `absent`: chips that are not
     soldered in, such as "converter0" or "driver2".
@@ -33,7 +34,7 @@ class Rp2040Board:
 
     def __init__(
         self,
-        name: str,
+        board: str | Path,
         firmware: Path,
         *,
         seed: int = 0,
@@ -41,15 +42,14 @@ class Rp2040Board:
         contact: bool = True,
         absent: tuple[str, ...] = (),
     ):
-        self.data = load_board(name)
+        self.data = boards.load(board)
         if not (math.isfinite(spread) and 0 <= spread <= 0.5):
             raise InvalidInput(f"spread is {spread}; give a share from 0 to 0.5, such as 0.1 for ± 10 %.")
         if seed < 0:
             raise InvalidInput(f"seed is {seed}; give a whole number from 0.")
-        n = self.data.BUBBLES
-        self.name = name
+        self.name: str = self.data.NAME
         self.tick_s: float = self.data.TICK_US * 1e-6
-        self.plant = make_plant(name, n, seed, spread, contact)
+        self.plant = make_plant(self.data, seed, spread, contact)
         self.chip = Chip(firmware)
         self.to_device = bytearray()
         self.from_device = self.chip.from_device

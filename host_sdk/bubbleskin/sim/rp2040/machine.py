@@ -10,8 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from bubbleskin import boards
 from bubbleskin.errors import LinkError
-from bubbleskin.sim.board import load_board
 from bubbleskin.sim.rp2040.boot_rom import INFO, BootRom, starts
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import Chip
@@ -25,9 +25,10 @@ _PUMP_SLICE = 7
 
 
 class EmulatedMachine:
-    """A wristband7 with `flash` in its flash chip, on a computer that shows boot loaders' drives at `drive`."""
+    """The board `board` with `flash` in its flash chip, on a computer that shows boot loaders' drives at `drive`."""
 
-    def __init__(self, flash: bytes | bytearray, drive: Path):
+    def __init__(self, flash: bytes | bytearray, drive: Path, board: str | Path = boards.DEFAULT):
+        self.board = board
         self.flash = bytearray(flash).ljust(FLASH_SIZE, b"\xff")
         self.drive = drive
         self.chip: Chip | None = None
@@ -48,7 +49,7 @@ class EmulatedMachine:
         chip = self.chip = Chip(None, self.flash)
         self._starts += 1  # the emulator's random numbers are the same at every start; the firmware adds this one
         chip.mcu.watchdog.scratch_data[0] = self._starts << 8
-        data = load_board("wristband7")
+        data = boards.load(self.board)
         SpiBus(chip, 0).add(Mcp3208(lambda channel: data.SENSOR_ZERO), data.CONVERTERS[0][0])
         chip.mcu.gpio[data.PIN_ESTOP].set_input_value(False)
         carrier = chip.mcu.pwm.channels[_PUMP_SLICE]
