@@ -46,6 +46,7 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache --no-logo
+	$(BIN)/python -m pytest -q -n 2 tests/house
 
 generated: setup ## fail if a generated file is out of date
 	@for tool in $(GENERATORS); do $(BIN)/python tools/generate/$$tool.py --check || exit 1; done; echo "generated files are up to date"

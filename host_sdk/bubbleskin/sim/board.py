@@ -1,6 +1,7 @@
-"""A whole wristband without hardware: the plant, and the firmware that controls it, in lockstep."""
+"""Whole wristbands without hardware: what each of them is, and the one whose firmware is stepped in lockstep."""
 
 import math
+from abc import ABC, abstractmethod
 from array import array
 from pathlib import Path
 from types import ModuleType
@@ -18,8 +19,71 @@ from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.plant import Plant, PlantParameters
 
 
-class SimulatedBoard:
+class Simulated(ABC):
     """A simulated wristband in virtual time: it moves only when it is stepped, and the same calls give the same bytes.
+
+    What the link, the simulator's server and a script need of one, whatever runs its firmware. `board`, `seed`, `spread`
+    and `contact` are those of `SimulatedBoard`.
+    """
+
+    def __init__(self, board: str | Path, *, seed: int = 0, spread: float = 0.0, contact: bool = True):
+        self.data = boards.load(board)
+        """The board's file."""
+        if not (math.isfinite(spread) and 0 <= spread <= 0.5):
+            raise InvalidInput(f"spread is {spread}; give a share from 0 to 0.5, such as 0.1 for ± 10 %.")
+        if seed < 0:
+            raise InvalidInput(f"seed is {seed}; give a whole number from 0.")
+        self.name: str = self.data.NAME
+        self.tick_s: float = self.data.TICK_US * 1e-6
+        """Length of one control period, s."""
+        self.plant = make_plant(self.data, seed, spread, contact)
+        self.to_device = bytearray()
+        """Bytes of the link that the firmware has not read yet."""
+        self.from_device = bytearray()
+        """Bytes of the link that the firmware has sent and nobody has taken yet."""
+        self._asked_s = 0.0  # of `step`, less than a tick
+
+    @property
+    @abstractmethod
+    def time(self) -> float:
+        """Virtual seconds since the start."""
+
+    @property
+    @abstractmethod
+    def height_mm(self) -> NDArray[np.float64]:
+        """The true heights, which the firmware can only estimate: each bubble's top above the base plane, mm, (n,)."""
+
+    @property
+    @abstractmethod
+    def pulses(self) -> NDArray[np.float64]:
+        """Seconds for which fill and vent valve of each bubble are open in the period now beginning, (n, 2)."""
+
+    def step(self, dt: float) -> None:
+        """Let `dt` virtual seconds pass, in whole ticks; what is left over comes with the next step."""
+        self._asked_s += dt
+        while self._asked_s > self.tick_s * (1 - 1e-9):
+            self._asked_s -= self.tick_s
+            self.tick()
+
+    @abstractmethod
+    def tick(self) -> None:
+        """Let one control period pass."""
+
+    @abstractmethod
+    def listen(self, phase_us: int) -> None:
+        """Let the firmware answer what has come over the link, `phase_us` µs after the last tick; no time passes."""
+
+    @abstractmethod
+    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
+        """Make something fail, as of `Plant.inject`: `number` is the bubble's. A value of 0 mends it."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End the firmware."""
+
+
+class SimulatedBoard(Simulated):
+    """A simulated wristband whose firmware and plant are stepped in lockstep, in virtual time.
 
     `board`: its name, or the path of its file. `seed`: of sensor noise and spread. `spread`: how much walls, valves and
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
@@ -38,27 +102,16 @@ class SimulatedBoard:
         firmware: Firmware | None = None,
         flash: NorFlash | None = None,
     ):
-        self.data = boards.load(board)
-        if not (math.isfinite(spread) and 0 <= spread <= 0.5):
-            raise InvalidInput(f"spread is {spread}; give a share from 0 to 0.5, such as 0.1 for ± 10 %.")
-        if seed < 0:
-            raise InvalidInput(f"seed is {seed}; give a whole number from 0.")
+        super().__init__(board, seed=seed, spread=spread, contact=contact)
         n = self.data.BUBBLES
-        self.name: str = self.data.NAME
-        self.tick_s: float = self.data.TICK_US * 1e-6
-        self.plant = make_plant(self.data, seed, spread, contact)
         self.firmware = firmware or InProcessFirmware(self.data, seed + 1, flash)
-        self.to_device = bytearray()
-        self.from_device = bytearray()
-        self.pulses = np.zeros((n, 2))
-        """Seconds that fill and vent valve of each bubble are energised in the period now beginning, (n, 2)."""
-        self.pulses[:, 1] = self.tick_s
-        self._pump = 0.0
+        self._pulses = np.zeros((n, 2))
+        self._pulses[:, 1] = self.tick_s
+        self._pump = 0.0  # duty, 0 to 1
         self._dump = False
         self._counts = array("H", bytes(2 * (n + 1)))
         self._bubble_counts = np.frombuffer(self._counts, np.uint16)[:n]  # the same memory
-        self._decided: array | None = None  # what `pulses` were made from
-        self._owed = 0.0
+        self._decided: array | None = None  # what `_pulses` were made from
 
     @property
     def time(self) -> float:
@@ -67,38 +120,37 @@ class SimulatedBoard:
 
     @property
     def height_mm(self) -> NDArray[np.float64]:
-        """The true heights, which the firmware can only estimate, (n,)."""
+        """The true heights, which the firmware can only estimate: each bubble's top above the base plane, mm, (n,)."""
         return self.plant.height_mm
 
-    def step(self, dt: float) -> None:
-        """Let `dt` virtual seconds pass, in whole ticks; what is left over comes with the next step."""
-        self._owed += dt
-        while self._owed > self.tick_s * (1 - 1e-9):
-            self._owed -= self.tick_s
-            self.tick()
+    @property
+    def pulses(self) -> NDArray[np.float64]:
+        """Seconds for which fill and vent valve of each bubble are energised in the period now beginning, (n, 2)."""
+        return self._pulses
 
     def tick(self) -> None:
         """One period: the firmware reads the sensors and decides, while the plant goes on as decided before."""
         self._bubble_counts[:] = self.plant.sense()
         self._counts[-1] = self.plant.sense_supply()
-        link = bytes(self.to_device[:LINK_IN])
-        del self.to_device[:LINK_IN]
-        outputs = self.firmware.tick(self._counts, link)
-        self.plant.advance(self.tick_s, self.pulses[:, 0], self.pulses[:, 1], self._pump, self._dump)
+        outputs = self.firmware.tick(self._counts, self._link_in())
+        self.plant.advance(self.tick_s, self._pulses[:, 0], self._pulses[:, 1], self._pump, self._dump)
         self._take(outputs)
 
     def listen(self, phase_us: int) -> None:
-        """Between two ticks, `phase_us` after the last: the firmware answers what has come over the link."""
+        """Between two ticks, `phase_us` µs after the last: the firmware answers what has come over the link."""
+        self._take(self.firmware.listen(self._link_in(), phase_us))
+
+    def _link_in(self) -> bytes:
         link = bytes(self.to_device[:LINK_IN])
         del self.to_device[:LINK_IN]
-        self._take(self.firmware.listen(link, phase_us))
+        return link
 
     def _take(self, outputs: Outputs) -> None:
         self.from_device += outputs.link
         if outputs.pulses != self._decided:
             self._decided = outputs.pulses
             pulses = np.frombuffer(outputs.pulses, np.uint16).reshape(-1, 2)
-            np.minimum(pulses * 1e-6, self.tick_s, out=self.pulses)
+            np.minimum(pulses * 1e-6, self.tick_s, out=self._pulses)
         self._pump = outputs.pump / 65535
         self._dump = outputs.dump
 
@@ -106,13 +158,13 @@ class SimulatedBoard:
         """Power fails and comes back: the firmware starts again, with what flash holds; bytes under way are lost."""
         self.to_device.clear()
         self.from_device.clear()
-        self.pulses[:] = 0.0, self.tick_s
+        self._pulses[:] = 0.0, self.tick_s
         self._pump, self._dump, self._decided = 0.0, False, None
         self.firmware.reset()
 
-    def inject(self, fault: str, bubble: int, value: float = 1.0) -> None:
-        """Give a bubble a fault, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 takes it away."""
-        self.plant.inject(fault, bubble, value)
+    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
+        """Make bubble `number` fail, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 mends it."""
+        self.plant.inject(fault, number, value)
 
     def close(self) -> None:
         """End the firmware."""

@@ -1,8 +1,9 @@
 """The firmware as the simulator sees it: sensor counts and bytes of the link in, valve pulses and bytes out, tick by tick."""
 
+from abc import ABC, abstractmethod
 from array import array
 from types import ModuleType
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from bubble_firmware.app import App
 from bubbleskin.sim.flash import NorFlash
@@ -20,23 +21,27 @@ class Outputs(NamedTuple):
     """What it sends over the link."""
 
 
-class Firmware(Protocol):
-    """Some interpreter with the firmware in it."""
+class Firmware(ABC):
+    """The firmware in some interpreter, as the simulator drives it."""
 
+    @abstractmethod
     def tick(self, counts: array, link: bytes) -> Outputs:
         """One period: sensor counts (the supply's last) and bytes of the link in, decisions out."""
 
+    @abstractmethod
+    def listen(self, link: bytes, phase_us: int) -> Outputs:
+        """Bytes of the link, `phase_us` µs after a period has begun."""
+
+    @abstractmethod
     def reset(self) -> None:
         """Power fails and comes back: start again, with what flash holds."""
 
-    def listen(self, link: bytes, phase_us: int) -> Outputs:
-        """Bytes of the link so many µs after a period has begun."""
-
+    @abstractmethod
     def close(self) -> None:
         """End it."""
 
 
-class InProcessFirmware:
+class InProcessFirmware(Firmware):
     """The firmware in this very interpreter. It is also the `hands` of the firmware's `App`."""
 
     late_ticks = 0
