@@ -11,10 +11,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bubbleskin import boards
 from bubbleskin.errors import InvalidInput
 
-_NEIGHBOUR = 1.25  # bubbles nearer than this many pitches touch when they grow
-_SAME_MM = 1e-3
+_SAME_MM = 1e-3  # in which devices tell where their bubbles are
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +97,6 @@ class Layout:
 
         Raises `InvalidInput` where there is no such board.
         """
-        from bubbleskin import boards  # only who asks for a board needs the firmware's files
-
         data = boards.load(board)
         return cls.from_um(data.LAYOUT, data.PITCH_UM)
 
@@ -106,7 +104,7 @@ class Layout:
     def neighbours(self) -> tuple[tuple[int, ...], ...]:
         """For each bubble the bubbles around it, in order of index."""
         gap = np.linalg.norm(self.positions_mm[:, None] - self.positions_mm[None], axis=2)
-        near = (gap > 0) & (gap < _NEIGHBOUR * self.pitch_mm)
+        near = (gap > 0) & (gap < boards.NEIGHBOUR * self.pitch_mm)
         return tuple(tuple(np.flatnonzero(row).tolist()) for row in near)
 
     def names(self, bubbles: Sequence[int]) -> str:

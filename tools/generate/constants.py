@@ -29,7 +29,7 @@ from bubble_protocol.schema import messages
 
 FOLDERS = ("protocol/bubble_protocol", "firmware/bubble_firmware")
 REGION = re.compile(
-    r"(?P<head>(?:^# \[constants\] .*\n)+)(?P<body>.*?)^# \[end of constants\]\n", re.MULTILINE | re.DOTALL
+    r"(?P<head>(?:^# \[constants\] [^\n]*\n)+)(?P<body>.*?)^# \[end of constants\]\n", re.MULTILINE | re.DOTALL
 )
 _TEXT_VALUES = 16
 

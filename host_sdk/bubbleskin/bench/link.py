@@ -10,6 +10,7 @@ import numpy as np
 import serial
 
 from bubbleskin.bench.rows import Row
+from bubbleskin.boards import DEFAULT
 from bubbleskin.connect import connect
 from bubbleskin.link import message
 from bubbleskin.link.link import run_sync
@@ -26,7 +27,7 @@ def far_end() -> None:
     from bubbleskin.sim.serve import PtyEnd, serve
 
     end = PtyEnd()
-    _, board = open_board("micropython", "wristband7", {})
+    _, board = open_board("micropython", DEFAULT, {})
     for _ in range(10):
         board.tick()  # the plant's first steps load what numba has compiled
     print(end.name, flush=True)

@@ -5,6 +5,7 @@ import time
 import numpy as np
 
 from bubbleskin.bench.rows import Row
+from bubbleskin.boards import DEFAULT, NAMES
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.transport import SimulatedTransport
@@ -17,9 +18,11 @@ _EVERY = 2.0  # seconds between two shows
 def rows() -> list[Row]:
     """The firmware in process, with a new random shape every 2 s, and at rest."""
     return [
-        _run("sim://wristband7, a new shape every 2 s", "wristband7", moving=True, target="≥ 20"),
-        _run("sim://wristband7, at rest", "wristband7", moving=False, target=""),
-        _run("sim://wristband19, a new shape every 2 s", "wristband19", moving=True, target=""),
+        *(
+            _run(f"sim://{name}, a new shape every 2 s", name, moving=True, target="≥ 20" if name == DEFAULT else "")
+            for name in NAMES
+        ),
+        _run(f"sim://{DEFAULT}, at rest", DEFAULT, moving=False, target=""),
     ]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from bubble_firmware.control.nominal import KNOTS
 from bubble_firmware.drivers import clock, pca9685
-from bubbleskin.boards.fields import EXPANDER_FIELDS, FIELDS, GPIOS, Field
+from bubbleskin.boards.fields import EXPANDER_FIELDS, FIELDS, GPIOS, NEIGHBOUR, Field
 from bubbleskin.errors import InvalidInput
 
 NAME_BYTES = 16
@@ -18,8 +18,7 @@ PWM_BUBBLES = 7
 PER_CHIP = 8
 """Bubbles that one PCA9685 or one MCP3208 has channels for."""
 NEAREST = 0.75
-NEIGHBOUR = 1.25
-"""Bubbles nearer than so many pitches are neighbours, and none may be nearer than `NEAREST`."""
+"""So many pitches must be between any two bubbles."""
 
 _SYSTEM_MHZ = 125
 _LAYOUT_MAX_UM = 500_000

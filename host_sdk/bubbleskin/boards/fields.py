@@ -7,6 +7,8 @@ from bubble_firmware.control.nominal import KNOTS
 
 BUBBLES_MAX = 24
 """As many as a frame has room for, see STATE_REPLY."""
+NEIGHBOUR = 1.25
+"""Bubbles nearer than so many pitches are neighbours: they touch when they grow."""
 RELIEF_PA = 80000
 """At which the reservoir's relief valve opens, without any firmware."""
 GPIOS = (*range(23), 25, 26, 27, 28)
