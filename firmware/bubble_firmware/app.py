@@ -1,4 +1,4 @@
-"""The tick: sense, estimate, guard, control, act, talk. What the board as a whole does is decided here.
+"""The tick: sense, estimate, watch, control, act, talk. What the board as a whole does is decided here.
 
 `hands` is the board's hardware, or what stands in for it:
 
@@ -34,6 +34,7 @@ from bubble_firmware.handlers.sequence import SequenceRequests
 from bubble_firmware.handlers.store import StoreRequests
 from bubble_firmware.link.server import Session
 from bubble_firmware.safety import fault_monitor, state
+from bubble_firmware.safety.deadman import Deadman
 from bubble_firmware.safety.fault_log import FaultLog
 from bubble_firmware.safety.self_test import SelfTest
 from bubble_firmware.sequence.player import Player
@@ -69,9 +70,10 @@ class App:
         self.bubbles = Bubbles(board, self.tables)
         self.supply = Supply(board)
         self.self_test = SelfTest(board, hands.self_test)
-        self.safety = state.Safety(board)
+        self.safety = state.SafetyState(board)
+        self.deadman = Deadman(board)
         self.settings = Settings(board)
-        self.guard = fault_monitor.Guard(board, self.bubbles)
+        self.fault_monitor = fault_monitor.FaultMonitor(board, self.bubbles)
         self.log = FaultLog()
         self._fault_id = 0  # of the board's newest fault
         self._fault_ids = array("i", bytearray(4 * board.BUBBLES))  # of each bubble's
@@ -124,17 +126,17 @@ class App:
         supply.sense(counts[bubbles.count])
         if hands.alarms or supply.lost:
             self._alarm(hands.alarms)
-        silence = self.safety.watch(self._moving)
-        if silence != state.NOTHING:
+        silence = self.deadman.tick(self.safety.mode, self._moving)
+        if silence != state.NO_EVENT:
             self._silence(silence)
         if self.player.running:
             self.player.tick()
-        bubbles.step(counts, supply.pressure_pa, self.safety.drive)
-        self.guard.spare(supply.pressure_pa)
-        found = self.guard.check()
-        self._moving = found & fault_monitor.MOVES
-        self.safety.settle(found & fault_monitor.PRESSED)
-        if found & (fault_monitor.NEW | fault_monitor.OVERFILLED):
+        bubbles.step(counts, supply.pressure_pa, self.safety.control_mode)
+        self.fault_monitor.block_backflow(supply.pressure_pa)
+        found = self.fault_monitor.check()
+        self._moving = found & fault_monitor.MOVING_BUBBLE
+        self.safety.update_venting(found & fault_monitor.PRESSED_BUBBLE)
+        if found & (fault_monitor.NEW_FAULT | fault_monitor.OVERFILLED_BUBBLE):
             self._found(found)
         if self.safety.mode == modes.BOOT:
             self._test()
@@ -160,9 +162,9 @@ class App:
         self.hands.vent()  # first of all
         self.exceptions += 1
         self.fault(EXCEPTION)
-        self.safety.take(state.FAILED)
+        self.safety.handle(state.EXCEPTION)
         self.player.cancel()
-        self.bubbles.rest()
+        self.bubbles.retract()
 
     def _alarm(self, alarms):
         if self.supply.lost:
@@ -172,30 +174,30 @@ class App:
             self.hands.vent()
             self.self_test.skip()
             self.player.cancel()
-            if self.safety.take(state.ESTOP if alarms & ESTOP else state.FAULT):
-                self.bubbles.rest()
+            if self.safety.handle(state.ESTOP if alarms & ESTOP else state.BOARD_FAULT):
+                self.bubbles.retract()
 
     def _silence(self, event):
-        if self.safety.take(event):
+        if self.safety.handle(event):
             self.player.cancel()
-            ms = self.safety.silent * (self.board.TICK_US // 1000)
+            ms = self.deadman.silent_ticks * (self.board.TICK_US // 1000)
             self.log.add(self.ticks, faults.HOST_SILENT, faults.BOARD, ms)
             if self.safety.mode == HOLDING:
-                self.bubbles.hold()
+                self.bubbles.hold_position()
             else:
-                self.bubbles.rest()
+                self.bubbles.retract()
 
     def _found(self, found):
         bubbles = self.bubbles
         for i in range(bubbles.count):
-            new = self.guard.unseen(i)
+            new = self.fault_monitor.take_new_faults(i)
             bit = 1
             while new:
                 if new & 1:
                     self._fault_ids[i] = self.log.add(self.ticks, bit, i, bubbles.pressure_pa(i))
                 new >>= 1
                 bit <<= 1
-        if found & fault_monitor.OVERFILLED:
+        if found & fault_monitor.OVERFILLED_BUBBLE:
             self._alarm(OVERFILLED)
 
     def fault(self, bits):
@@ -215,30 +217,30 @@ class App:
         if not self.self_test.running:
             if self.self_test.failed:
                 self.fault(SELF_TEST)
-            self.safety.take(state.TESTED)
+            self.safety.handle(state.TESTED)
 
     def show(self, values, first, over_ms):
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""
         self.self_test.skip()
         self.player.cancel()
-        self.safety.take(state.SHOW)
+        self.safety.handle(state.SHOW)
         if self.safety.mode == ACTIVE:
             ticks = over_ms * 1000 // self.board.TICK_US
-            self.bubbles.show(values, first, ticks if ticks > 1 else 1)
+            self.bubbles.set_targets(values, first, ticks if ticks > 1 else 1)
 
     def stop(self):
         """Close all valves and keep the air, unless a fault of the board keeps the vents open."""
         self.self_test.skip()
         self.player.cancel()
-        self.safety.take(state.STOP)
+        self.safety.handle(state.STOP)
         if self.safety.mode == HOLDING:
-            self.bubbles.hold()
+            self.bubbles.hold_position()
 
     def vent(self):
         """Open all vent valves until the next `show`."""
         self.player.cancel()
-        self.safety.take(state.VENT)
-        self.bubbles.rest()
+        self.safety.handle(state.VENT)
+        self.bubbles.retract()
 
     def clear(self):
         """Acknowledge all faults: forget them; what still is wrong faults again."""
@@ -249,25 +251,25 @@ class App:
         self.log.acknowledge(up_to)
         for i in range(self.bubbles.count):
             if self._fault_ids[i] <= up_to:
-                self.bubbles.forget(i)
-                self.guard.forget(i)
+                self.bubbles.clear_faults(i)
+                self.fault_monitor.acknowledge(i)
         if self._fault_id <= up_to:
             self.faults = 0
             self.supply.clear()
             self.hands.clear()
-            self.safety.take(state.CLEAR)
+            self.safety.handle(state.CLEAR)
             if self.hands.alarms & ESTOP:  # still pressed
                 self._alarm(ESTOP)
 
     def heard(self):
         """A valid frame of the host's has come: it lives."""
-        self.safety.heard()
+        self.deadman.host_activity()
 
     def use_settings(self):
         """The settings have changed."""
         values = self.settings.values
-        self.safety.set_deadman(values[settings.DEADMAN_HOLD], values[settings.DEADMAN_VENT])
-        self.guard.set_budget(values[settings.BUDGET_KPA_S])
+        self.deadman.configure(values[settings.DEADMAN_HOLD], values[settings.DEADMAN_VENT])
+        self.fault_monitor.set_budget(values[settings.BUDGET_KPA_S])
 
     def restart(self, into):
         """Vent and start again."""

@@ -41,6 +41,9 @@ class Layout:
     def __len__(self) -> int:
         return len(self.positions_mm)
 
+    def __repr__(self) -> str:
+        return f"<Layout of {len(self)} bubbles, {self.pitch_mm:g} mm apart>"
+
     def __eq__(self, other: object) -> bool:
         """Whether the same bubbles are at the same places, to the µm in which devices tell them."""
         return (

@@ -8,7 +8,7 @@ import pytest
 
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_firmware.control.step import ROW, SETPOINT
+from bubble_firmware.control.state_layout import ROW_WORDS, SETPOINT
 from bubble_protocol import codec, steps
 from bubble_protocol.schema import messages
 from bubble_protocol.schema.messages import HELLO, PING
@@ -302,8 +302,8 @@ class Sequencer:
 
     def setpoints(self):
         """µm, where the ramps are now."""
-        rows = self.rig.app.bubbles._rows
-        return [rows[i * ROW + SETPOINT] / 16 for i in range(self.n)]
+        rows = self.rig.app.bubbles.rows
+        return [rows[i * ROW_WORDS + SETPOINT] / 16 for i in range(self.n)]
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import pytest
 import bubbleskin as bs
 from bubble_protocol.schema import messages
 from bubble_protocol.schema.system import CAN_TELL_LAYOUT, DELIVERY, SAFETY
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.message import encode
-from bubbleskin.skin import AsyncSkin
 
 PLACES = [(0, 0), (12000, 0), (0, 12000), (12000, 12001)]
 

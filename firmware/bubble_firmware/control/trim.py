@@ -1,12 +1,12 @@
 """What sets one bubble apart besides its table: its sensor's zero, its valves' dead times, its restrictor's flow.
 
-Four numbers a bubble, the first of its row in `control`. Without better knowledge they are the board's. What is taken up
+Four numbers a bubble, the first of its row, see `state_layout`. Without better knowledge they are the board's. What is taken up
 is within limits of the board's own figures: a zero that is off moves the pressure limit by as much.
 """
 
 from array import array
 
-from bubble_firmware.control import step
+from bubble_firmware.control.flow import flow_gain
 
 COUNT = 4  # zero in counts, opens_us, closes_us, flow_gain
 _ZERO_PA = 1500  # as far as a good sensor may be off, see selftest
@@ -19,7 +19,7 @@ class Trim:
         self._bubbles = bubbles
         off = _ZERO_PA // board.SENSOR_PA_PER_COUNT
         dead_us = board.TICK_US // 2
-        gain = step.flow_gain(board)
+        gain = flow_gain(board)
         self.nominal = array("i", (board.SENSOR_ZERO, board.VALVE_OPENS_US, board.VALVE_CLOSES_US, gain))
         self.low = array("i", (max(board.SENSOR_ZERO - off, board.COUNT_LOW + 1), 0, 0, gain // 4))
         self.high = array("i", (board.SENSOR_ZERO + off, dead_us, dead_us, min(4 * gain, 65535)))
@@ -34,14 +34,14 @@ class Trim:
     def use(self, values):
         """Take up the figures of all bubbles."""
         for at in range(COUNT * self._bubbles.count):
-            self._bubbles.set_figure(at // COUNT, at % COUNT, values[at])
+            self._bubbles.set_trim(at // COUNT, at % COUNT, values[at])
 
     def use_nominal(self):
         """Take up the board's."""
         for at in range(COUNT * self._bubbles.count):
-            self._bubbles.set_figure(at // COUNT, at % COUNT, self.nominal[at % COUNT])
+            self._bubbles.set_trim(at // COUNT, at % COUNT, self.nominal[at % COUNT])
 
     def read(self, values):
         """Put the figures of all bubbles in `values`."""
         for at in range(COUNT * self._bubbles.count):
-            values[at] = self._bubbles.figure(at // COUNT, at % COUNT)
+            values[at] = self._bubbles.trim(at // COUNT, at % COUNT)

@@ -5,8 +5,8 @@ A handler finds the request's values in `self._values` and answers once, with `_
 `_refuse`; lengths and the schema's limits have been checked.
 """
 
-from bubble_firmware.control import step
 from bubble_firmware.control.table import KNOTS_MAX
+from bubble_firmware.control.trajectory import first_above
 from bubble_firmware.tick_stats import BINS
 from bubble_protocol.mpy_compat import heap_free
 from bubble_protocol.schema import errors, faults, messages
@@ -50,7 +50,7 @@ class Requests:
         values[4] = self._decoder.good
         values[5] = self._decoder.bad
         values[6] = self._telemetry.dropped
-        if not app.safety.drive:  # vented: counting takes longer than a tick
+        if not app.safety.control_mode:  # vented: counting takes longer than a tick
             app.hands.slack()
             self._heap_free = heap_free()
         values[7] = self._heap_free
@@ -75,7 +75,7 @@ class Requests:
         if self._app.faults & faults.VENTING:
             self._refuse(errors.BOARD_FAULT, 0, NO_ELEMENT, self._app.faults, 0, 0)
             return
-        high = step.first_above(values, 1, 1 + count, board.HEIGHT_MAX_UM)
+        high = first_above(values, 1, 1 + count, board.HEIGHT_MAX_UM)
         if high >= 0:
             self._refuse(errors.OUT_OF_RANGE, 1, high - 1, values[high], 0, board.HEIGHT_MAX_UM)
             return
@@ -171,5 +171,5 @@ class Requests:
     def _fill_state(self):
         self._values[0] = self._app.ticks
         self._values[1] = self._app.mode
-        self._app.bubbles.report(self._values, 2)
+        self._app.bubbles.pack_state(self._values, 2)
         return self._app.board.BUBBLES

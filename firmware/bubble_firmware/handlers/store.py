@@ -63,7 +63,7 @@ class StoreRequests:
     def _vented(self):
         """Whether all bubbles are vented; refuses where they are not."""
         safety = self._app.safety
-        if safety.drive == IDLE:
+        if safety.control_mode == IDLE:
             return True
         self._session._refuse(errors.NOT_VENTED, 0, _NO_ELEMENT, safety.mode, IDLE, IDLE)
         return False

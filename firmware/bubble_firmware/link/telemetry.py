@@ -2,19 +2,19 @@
 
 from array import array
 
-from bubble_firmware.control import step
+from bubble_firmware.control import state_layout as layout
 from bubble_protocol import codec, frame
 from bubble_protocol.schema import messages
 
 _COLUMNS = (  # where each column stands in a bubble's row, and by how many bits it is shifted
-    (step.HEIGHT, 4),
-    (step.PRESSURE, 2),
-    (step.TARGET, 0),
-    (step.STATUS, 0),
-    (step.FAULTS, 0),
-    (step.SETPOINT, 4),
-    (step.FILL_US, 0),
-    (step.VENT_US, 0),
+    (layout.HEIGHT, 4),
+    (layout.PRESSURE, 2),
+    (layout.TARGET, 0),
+    (layout.STATUS, 0),
+    (layout.FAULTS, 0),
+    (layout.SETPOINT, 4),
+    (layout.FILL_US, 0),
+    (layout.VENT_US, 0),
 )
 
 
@@ -79,10 +79,10 @@ class Telemetry:
         values[0] = app.ticks
         values[1] = app.mode
         if not self._fields:
-            app.bubbles.report(values, 2)
+            app.bubbles.pack_state(values, 2)
             return app.bubbles.count
         values[2] = app.faults
         values[3] = app.supply.pressure_pa
         values[4] = self._dropped
         values[5] = self._fields
-        return app.bubbles.pick(values, self._plan, self._fixed, self._columns)
+        return app.bubbles.pack_fields(values, self._plan, self._fixed, self._columns)

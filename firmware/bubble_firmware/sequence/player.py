@@ -152,7 +152,7 @@ class Player:
             playing = self.state != WAITING
             self.cancel()
             if playing:
-                self._app.bubbles.hold()
+                self._app.bubbles.hold_position()
         self.id = number
         self.state = LOADING
         self.reason = UNENDED
@@ -214,7 +214,7 @@ class Player:
         self._depth = 0
         self.sequence.next = 0
         self._next(UNENDED)
-        app.safety.take(state.SHOW)
+        app.safety.handle(state.SHOW)
 
     def _over(self, elapsed):
         """Why the step is over after so many ticks of it, UNENDED where it is not."""
@@ -292,7 +292,7 @@ class Player:
             self._carry_us = span_us % tick_us
         self.unsettled = 0
         self._moving = True
-        self._app.bubbles.begin(memory, at + steps.HEAD, self._app.mode != ACTIVE)
+        self._app.bubbles.begin_step(memory, at + steps.HEAD, self._app.mode != ACTIVE)
 
     def _end_by_timeout(self, tick):
         app = self._app
