@@ -21,7 +21,8 @@ from bubble_protocol.schema import (
 )
 from bubble_protocol.schema.messages import I16, I32, MESSAGES, REPLY, TEXT, U8, U16, U32
 from bubbleskin.boards import NAMES
-from bubbleskin.link.message import Message, describe_refusal
+from bubbleskin.link.message import Message
+from bubbleskin.link.refusals import describe_refusal
 
 RANGES = {
     U8: (0, 0xFF),

@@ -6,7 +6,8 @@ from bubble_protocol import frame
 from bubble_protocol.schema import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin import boards
-from bubbleskin.link.message import Reader, encode, session_key
+from bubbleskin.link.message import encode, session_key
+from bubbleskin.link.reader import Reader
 from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.micropython import MicroPythonFirmware
 
