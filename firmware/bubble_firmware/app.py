@@ -29,6 +29,7 @@ from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.supply import Supply
 from bubble_firmware.control.table import Tables
 from bubble_firmware.control.trim import Trim
+from bubble_firmware.handlers.layout import LayoutRequests
 from bubble_firmware.handlers.sequence import SequenceRequests
 from bubble_firmware.handlers.store import StoreRequests
 from bubble_firmware.link.server import Session
@@ -85,6 +86,7 @@ class App:
         self.session = Session(self)
         StoreRequests(self, self.session)
         self.sequence_requests = SequenceRequests(self, self.session)
+        LayoutRequests(self, self.session)
         self._counts = array("H", bytearray(2 * (board.BUBBLES + 1)))
         hands.vent()
 

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin import boards
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
 
 BOOT_ID = 1
@@ -28,7 +29,7 @@ def record(name: str, phases: Sequence[tuple[str, float, float, float]], seed: i
 
     A phase with no shapes, 0 s between them, holds what there is.
     """
-    firmware = InProcessFirmware(load_board(name), BOOT_ID)
+    firmware = InProcessFirmware(boards.load(name), BOOT_ID)
     bubbles = firmware.app.bubbles
     step = bubbles.step
     ticks: list[Tick] = []
