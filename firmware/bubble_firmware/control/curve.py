@@ -16,7 +16,7 @@ _ATMOSPHERE = const(101325)
 _RISE_MIN = const(1)  # µJ/µm
 _SLOPE_MAX = const(1 << 20)  # *256: steeper, and a deadband's air is beyond 32 bits
 
-# [constants] bubble_firmware.control.state_layout: KNOT_HEIGHT KNOT_AIR KNOT_PRESSURE KNOT_SLOPE KNOT_RECIPROCAL KNOT_WORDS
+# [constants] bubble_firmware.control.state_layout: used
 _KNOT_HEIGHT = const(0)
 _KNOT_AIR = const(1)
 _KNOT_PRESSURE = const(2)

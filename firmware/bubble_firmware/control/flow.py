@@ -10,7 +10,7 @@ from array import array
 
 from bubble_protocol.mpy_compat import const
 
-# [constants] bubble_firmware.control.state_layout: ROOT_STEPS
+# [constants] bubble_firmware.control.state_layout: used
 _ROOT_STEPS = const(64)
 # [end of constants]
 
