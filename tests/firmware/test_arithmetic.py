@@ -221,4 +221,5 @@ def test_nothing_overflows_32_bits(rig7, seed):
                 rig7.hands.counts = [
                     chance.choice([9, 160, 1500, 2600, 4086, chance.randrange(4096)]) for _ in range(8)
                 ]
-                rig7.app._control()  # not `tick`, which would catch what we look for
+                rig7.app.tick()
+                assert rig7.app.exceptions == 0, "a word was beyond 32 bits"

@@ -55,6 +55,7 @@ _SETTLED_UM = const(14)
 _REST_UM = const(15)
 _ROOTS = const(20)
 _ROOT_STEPS = const(64)
+_ATMOSPHERE = const(101325)
 _VENT = const(0)
 _FOLLOW = const(1)
 _RESTING = const(0)
@@ -65,7 +66,6 @@ _FAULT = const(4)
 _VALVE_TIME = const(4)
 # [end of constants]
 
-_ATMOSPHERE = const(101325)
 _SAMPLES_DOSED = const(16)  # left after a short dose, which is metered well
 _INTEGRAL_MAX = const(1 << 17)
 _DOSE_MAX = const(50000)  # µJ, more than any period brings

@@ -56,6 +56,7 @@ _COUNT_HIGH = const(4)
 _PRESSURE_MAX = const(5)
 _CONTROL_MODE = const(16)
 _ROWS = const(150)
+_READINGS_MIN = const(2)
 _OVERPRESSURE = const(1)
 _SENSOR_LOST = const(2)
 # [end of constants]
@@ -64,7 +65,6 @@ _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps ever
 _SAMPLES_MAX = const(64)
 _INNOVATION_UM = const(500)  # further off than metering ever is,
 _INNOVATION_PA = const(500)  # by more than noise: believe the sensor afresh
-_READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noise
 _ABSENT = const(0xFFFF)  # a count that says: no chip has answered. That is no noise
 
 

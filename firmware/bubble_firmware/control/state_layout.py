@@ -89,6 +89,9 @@ ROOTS = const(20)
 ROOT_STEPS = const(64)  # in each of the two tables
 ROWS = const(150)
 
+ATMOSPHERE = const(101325)  # Pa
+READINGS_MIN = const(2)  # in a row that make a fault: one alone is noise
+
 # What control is to do with all bubbles: open the vents, follow the setpoints, keep all valves closed.
 VENT = const(0)
 FOLLOW = const(1)
