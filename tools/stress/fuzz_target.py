@@ -17,7 +17,7 @@ from bubble_protocol.schema import messages
 from bubbleskin.link import message
 
 # In C, for the sake of speed; test_crc holds them against each other.
-crc._crc32_into = lambda table, buffer, start, end, out, at: message._crc32_into(buffer, start, end, out, at)
+crc._crc32_into = lambda table, buffer, start, end, out, at: message.crc32_into(buffer, start, end, out, at)
 _SESSION = b"\xab\xcd\xef\x01"
 
 

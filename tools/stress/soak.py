@@ -33,7 +33,7 @@ IMPAIRMENT = Impairment(
     drop=0.10, duplicate=0.05, flip=0.005, truncate=0.005, reorder=0.02, split=0.02, stall=0.0005, reset=0.01
 )
 WORKERS = 12
-firmware_session.crc32_into = message._crc32_into  # C instead of Python; test_crc holds them against each other
+firmware_session.crc32_into = message.crc32_into  # C instead of Python; test_crc holds them against each other
 BASE = 9000
 """SHOW's first two heights are the command's number to this base."""
 
@@ -64,7 +64,7 @@ class Device(Transport):
         self.from_device = bytearray()
         self.boot_id = self.boot_id * 1103515245 + 12345 & 0x3FFFFFFF
         self.app = App(self.board, self)
-        self.app.session._decoder._crc32_into = message._crc32_into
+        self.app.session._decoder._crc32_into = message.crc32_into
         self.journals.append(array("i"))
         self._tap(self.journals[-1])
 
