@@ -29,20 +29,30 @@ from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.supply import Supply
 from bubble_firmware.control.table import Tables
 from bubble_firmware.control.trim import Trim
+from bubble_firmware.handlers.layout import LayoutRequests
 from bubble_firmware.handlers.sequence import SequenceRequests
 from bubble_firmware.handlers.store import StoreRequests
 from bubble_firmware.link.server import Session
-from bubble_firmware.safety import fault_monitor, state
+from bubble_firmware.safety import state
 from bubble_firmware.safety.deadman import Deadman
 from bubble_firmware.safety.fault_log import FaultLog
+from bubble_firmware.safety.fault_monitor import FaultMonitor
 from bubble_firmware.safety.self_test import SelfTest
 from bubble_firmware.sequence.player import Player
 from bubble_firmware.store.settings import Settings
 from bubble_firmware.store.slots import Store
 from bubble_firmware.tick_stats import bins, count, later
+from bubble_protocol.mpy_compat import const
 from bubble_protocol.schema import faults, modes, settings
 from bubble_protocol.schema.faults import ESTOP, EXCEPTION, OVERFILLED, SELF_TEST, SUPPLY_LOST, VENTING
 from bubble_protocol.schema.modes import ACTIVE, HOLDING, IDLE
+
+# [constants] bubble_firmware.safety.watch_layout: used
+_NEW_FAULT = const(1)
+_MOVING_BUBBLE = const(2)
+_PRESSED_BUBBLE = const(4)
+_OVERFILLED_BUBBLE = const(8)
+# [end of constants]
 
 _TIDY_MASK = 1023  # ticks
 
@@ -72,7 +82,7 @@ class App:
         self.safety = state.SafetyState(board)
         self.deadman = Deadman(board)
         self.settings = Settings(board)
-        self.fault_monitor = fault_monitor.FaultMonitor(board, self.bubbles)
+        self.fault_monitor = FaultMonitor(board, self.bubbles)
         self.log = FaultLog()
         self._fault_id = 0  # of the board's newest fault
         self._fault_ids = array("i", bytearray(4 * board.BUBBLES))  # of each bubble's
@@ -85,6 +95,7 @@ class App:
         self.session = Session(self)
         StoreRequests(self, self.session)
         self.sequence_requests = SequenceRequests(self, self.session)
+        LayoutRequests(self, self.session)
         self._counts = array("H", bytearray(2 * (board.BUBBLES + 1)))
         hands.vent()
 
@@ -132,9 +143,9 @@ class App:
         bubbles.step(counts, supply.pressure_pa, self.safety.control_mode)
         self.fault_monitor.block_backflow(supply.pressure_pa)
         found = self.fault_monitor.check()
-        self._moving = found & fault_monitor.MOVING_BUBBLE
-        self.safety.update_venting(found & fault_monitor.PRESSED_BUBBLE)
-        if found & (fault_monitor.NEW_FAULT | fault_monitor.OVERFILLED_BUBBLE):
+        self._moving = found & _MOVING_BUBBLE
+        self.safety.update_venting(found & _PRESSED_BUBBLE)
+        if found & (_NEW_FAULT | _OVERFILLED_BUBBLE):
             self._found(found)
         if self.safety.mode == modes.BOOT:
             self._test()
@@ -195,7 +206,7 @@ class App:
                     self._fault_ids[i] = self.log.add(self.ticks, bit, i, bubbles.pressure_pa(i))
                 new >>= 1
                 bit <<= 1
-        if found & fault_monitor.OVERFILLED_BUBBLE:
+        if found & _OVERFILLED_BUBBLE:
             self._alarm(OVERFILLED)
 
     def fault(self, bits):

@@ -9,7 +9,7 @@ from array import array
 from bubble_firmware.control.flow import flow_gain
 
 COUNT = 4  # zero in counts, opens_us, closes_us, flow_gain
-_ZERO_PA = 1500  # as far as a good sensor may be off, see selftest
+ZERO_PA = 1500  # as far as a good sensor's zero may be off
 
 
 class Trim:
@@ -17,7 +17,7 @@ class Trim:
 
     def __init__(self, board, bubbles):
         self._bubbles = bubbles
-        off = _ZERO_PA // board.SENSOR_PA_PER_COUNT
+        off = ZERO_PA // board.SENSOR_PA_PER_COUNT
         dead_us = board.TICK_US // 2
         gain = flow_gain(board)
         self.nominal = array("i", (board.SENSOR_ZERO, board.VALVE_OPENS_US, board.VALVE_CLOSES_US, gain))
