@@ -281,14 +281,12 @@ def test_nothing_overflows_32_bits(rig7, seed):
         tables.swap()
         rig7.app.bubbles.use_tables()
         for _ in range(4):
-            rig7.app.show(
+            rig7.app.commands.show(
                 array("i", [chance.choice([0, 14000, chance.randrange(14001)]) for _ in range(7)]),
                 0,
                 chance.choice([0, 60000]),
             )
             rig7.app.bubbles.clear_faults()
             for _ in range(12):
-                rig7.hands.counts = [
-                    chance.choice([9, 160, 1500, 2600, 4086, chance.randrange(4096)]) for _ in range(8)
-                ]
+                rig7.hal.counts = [chance.choice([9, 160, 1500, 2600, 4086, chance.randrange(4096)]) for _ in range(8)]
                 rig7.app._control()  # not `tick`, which would catch what we look for
