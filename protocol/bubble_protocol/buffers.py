@@ -16,9 +16,10 @@ def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
         start += 1
 
 
-if not COMPILED:  # CPython loops over bytes slowly, but slices in C
+# CPython loops over bytes slowly, but slices in C.
+if not COMPILED:  # type: ignore[misc]
 
-    def copy(source: "Buffer", start: int, end: int, target: bytearray, at: int) -> None:  # type: ignore[misc]
+    def copy(source: "Buffer", start: int, end: int, target: bytearray, at: int) -> None:
         """As above."""
         target[at : at + end - start] = source[start:end]
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_firmware.safety import state as safety
 from bubble_firmware.device_clock import LATEST, DeviceClock
+from bubble_firmware.safety import state as safety
 from bubble_firmware.safety.fault_log import FaultLog
 from bubble_firmware.safety.fault_monitor import BUDGET
 from bubble_protocol.schema import errors, modes, system
