@@ -1,10 +1,11 @@
-# make demo: see it. make test: every check that needs no hardware. make check: the everyday ones, under a minute.
+# make demo: see it. make test: every check that needs no hardware, 16 minutes on two cores. make check: the everyday ones, four.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 GENERATORS := constants nominal_table golden_vectors protocol_page cli_page state_page demo_picture membrane_pictures contact_pictures
+EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
@@ -26,8 +27,11 @@ $(READY): pyproject.toml constraints.txt
 demo: setup ## a simulated wristband takes two shapes; ends with a picture
 	$(BIN)/bubbleskin demo
 
-test: setup lint generated micropython ## every check that needs no hardware
-	$(BIN)/python -m pytest -n 2 -m "not chip"
+test: setup lint generated micropython ## every check that needs no hardware, 16 minutes
+	@echo "the everyday tests; coverage is recorded in these, because it makes them half as slow again"
+	$(BIN)/python -m pytest $(EVERYDAY) --cov --cov-report=term
+	@echo "the slow tests"
+	$(BIN)/python -m pytest -n 2 -m "slow and not chip"
 
 chip: setup micropython ## build the RP2040's firmware, run its tests and hil_tests on an emulated chip, 20 minutes
 	$(BIN)/bubbleskin firmware build
@@ -38,14 +42,15 @@ chip-long: setup micropython ## what takes longer on an emulated chip
 	$(BIN)/bubbleskin firmware build
 	$(BIN)/python -m pytest -n 2 -m "chip and long"
 
-check: setup lint ## the everyday checks, under a minute
-	$(BIN)/python -m pytest -n 2 -m "not slow and not chip"
+check: setup lint ## the everyday checks: lint, types, imports, rules, tests of a few seconds; four minutes
+	$(BIN)/python -m pytest $(EVERYDAY)
 
-lint: setup
+lint: setup ## style, types, import contracts, the rules of tests/house
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache --no-logo
+	$(BIN)/python -m pytest -q -n 2 tests/house
 
 generated: setup ## fail if a generated file is out of date
 	@for tool in $(GENERATORS); do $(BIN)/python tools/generate/$$tool.py --check || exit 1; done; echo "generated files are up to date"
@@ -69,5 +74,5 @@ day: setup micropython ## 24 virtual hours with faults and reconnects on MicroPy
 	$(BIN)/python tools/stress/day.py
 
 clean: ## remove what setup and tests made here
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find protocol firmware host_sdk tools tests hil_tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -36,19 +36,19 @@ if TYPE_CHECKING:
 
 # [constants] bubble_protocol.schema.faults: OVERFILLED SELF_TEST
 # [constants] bubble_protocol.schema.modes: BOOT IDLE
-# [constants] bubble_firmware.safety.state: NOTHING as EVENT_NOTHING TESTED as EVENT_TESTED
-# [constants] bubble_firmware.safety.fault_monitor: NEW as FOUND_NEW MOVES as FOUND_MOVES
-# [constants] bubble_firmware.safety.fault_monitor: PRESSED as FOUND_PRESSED OVERFILLED as FOUND_OVERFILLED
+# [constants] bubble_firmware.safety.state: NO_EVENT TESTED as EVENT_TESTED
+# [constants] bubble_firmware.safety.fault_monitor: NEW_FAULT MOVING_BUBBLE
+# [constants] bubble_firmware.safety.fault_monitor: PRESSED_BUBBLE OVERFILLED_BUBBLE
 _OVERFILLED = const(128)
 _SELF_TEST = const(64)
 _BOOT = const(3)
 _IDLE = const(0)
-_EVENT_NOTHING = const(-1)
+_NO_EVENT = const(-1)
 _EVENT_TESTED = const(0)
-_FOUND_NEW = const(1)
-_FOUND_MOVES = const(2)
-_FOUND_PRESSED = const(4)
-_FOUND_OVERFILLED = const(8)
+_NEW_FAULT = const(1)
+_MOVING_BUBBLE = const(2)
+_PRESSED_BUBBLE = const(4)
+_OVERFILLED_BUBBLE = const(8)
 # [end of constants]
 
 _IDLE_MASK = const(1023)  # ticks
@@ -70,10 +70,11 @@ class App:
         self.supply = state.supply
         self.self_test = state.self_test
         self.safety = state.safety
-        self.monitor = state.monitor
+        self.deadman = state.deadman
+        self.fault_monitor = state.fault_monitor
         self.faults = state.faults
         self.faults.latch_board(hal.boot_faults)
-        self.settings = Settings(board, self.safety, self.monitor)
+        self.settings = Settings(board, self.deadman, self.fault_monitor)
         content = Content(board, self.tables, self.bubbles, self.trim, self.settings)
         self.store = Store(board.NAME, hal.flash, content)
         self.player = Player(board, state, self.bubbles)
@@ -133,23 +134,23 @@ class App:
             self.commands.fault(hal.active_faults)
 
         # Where are the bubbles to go? Nowhere without a host that lives; else on with what it has asked for.
-        event = safety.watch(self._moves)
-        if event != _EVENT_NOTHING:
+        event = self.deadman.tick(safety.mode, self._moves)
+        if event != _NO_EVENT:
             self.commands.host_silent(event)
         if self.player.running:
             self.commands.finish(self.player.tick())
 
         # How long does each valve open? Estimates and pulses of all bubbles.
-        bubbles.step(counts, supply.pressure_pa, safety.drive)
-        self.monitor.spare(supply.pressure_pa)
+        bubbles.step(counts, supply.pressure_pa, safety.control_mode)
+        self.fault_monitor.block_backflow(supply.pressure_pa)
 
         # Is any of it wrong? A bubble with a fault is vented from the next tick on.
-        found = self.monitor.check()
-        self._moves = found & _FOUND_MOVES
-        safety.settle(found & _FOUND_PRESSED)
-        if found & (_FOUND_NEW | _FOUND_OVERFILLED):
+        found = self.fault_monitor.check()
+        self._moves = found & _MOVING_BUBBLE
+        safety.update_venting(found & _PRESSED_BUBBLE)
+        if found & (_NEW_FAULT | _OVERFILLED_BUBBLE):
             self.faults.latch_bubbles()
-            if found & _FOUND_OVERFILLED:
+            if found & _OVERFILLED_BUBBLE:
                 self.commands.fault(_OVERFILLED)
         if safety.mode == _BOOT:
             self._test()
@@ -169,7 +170,7 @@ class App:
         if not test.running:
             if test.failed:
                 self.faults.latch_board(_SELF_TEST)
-            self.safety.take(_EVENT_TESTED)
+            self.safety.handle(_EVENT_TESTED)
 
     def _communicate(self) -> None:
         hal = self.hal

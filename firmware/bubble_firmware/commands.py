@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 # [constants] bubble_protocol.schema.faults: ESTOP EXCEPTION HOST_SILENT SUPPLY_LOST VENTING
 # [constants] bubble_protocol.schema.modes: ACTIVE HOLDING
 # [constants] bubble_firmware.safety.state: SHOW as EVENT_SHOW STOP as EVENT_STOP VENT as EVENT_VENT
-# [constants] bubble_firmware.safety.state: CLEAR as EVENT_CLEAR ESTOP as EVENT_ESTOP FAULT as EVENT_FAULT FAILED as EVENT_FAILED
+# [constants] bubble_firmware.safety.state: CLEAR as EVENT_CLEAR ESTOP as EVENT_ESTOP
+# [constants] bubble_firmware.safety.state: BOARD_FAULT as EVENT_BOARD_FAULT EXCEPTION as EVENT_EXCEPTION
 _THEN_STOP = const(3)
 _THEN_VENT = const(2)
 _ESTOP = const(1)
@@ -33,8 +34,8 @@ _EVENT_STOP = const(2)
 _EVENT_VENT = const(3)
 _EVENT_CLEAR = const(10)
 _EVENT_ESTOP = const(9)
-_EVENT_FAULT = const(8)
-_EVENT_FAILED = const(7)
+_EVENT_BOARD_FAULT = const(8)
+_EVENT_EXCEPTION = const(7)
 # [end of constants]
 
 
@@ -48,6 +49,7 @@ class Commands:
         self._supply = state.supply
         self._self_test = state.self_test
         self._safety = state.safety
+        self._deadman = state.deadman
         self._faults = state.faults
         self._bubbles = bubbles
         self._player = player
@@ -58,30 +60,30 @@ class Commands:
         """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""
         self._self_test.skip()
         self._player.cancel()
-        self._safety.take(_EVENT_SHOW)
+        self._safety.handle(_EVENT_SHOW)
         if self._safety.mode == _ACTIVE:
             ticks = over_ms * 1000 // self._tick_us
-            self._bubbles.show(values, first, ticks if ticks > 1 else 1)
+            self._bubbles.set_targets(values, first, ticks if ticks > 1 else 1)
 
     def stop(self) -> None:
         """Close all valves and keep the air, unless a fault of the board keeps the vents open."""
         self._self_test.skip()
         self._player.cancel()
-        self._safety.take(_EVENT_STOP)
+        self._safety.handle(_EVENT_STOP)
         if self._safety.mode == _HOLDING:
-            self._bubbles.hold()
+            self._bubbles.hold_position()
 
     def vent(self) -> None:
         """Open all vent valves until the next `show`."""
         self._player.cancel()
-        self._safety.take(_EVENT_VENT)
-        self._bubbles.rest()
+        self._safety.handle(_EVENT_VENT)
+        self._bubbles.retract()
 
     def acknowledge(self, up_to: int) -> None:
         """Acknowledge the fault log up to this entry: faults that still are there come again."""
         if self._faults.acknowledge(up_to):
             self._hal.clear_faults()
-            self._safety.take(_EVENT_CLEAR)
+            self._safety.handle(_EVENT_CLEAR)
             if self._hal.active_faults & _ESTOP:  # still pressed
                 self.fault(_ESTOP)
 
@@ -102,18 +104,18 @@ class Commands:
             self._hal.safe_outputs()
             self._self_test.skip()
             self._player.cancel()
-            if self._safety.take(_EVENT_ESTOP if bits & _ESTOP else _EVENT_FAULT):
-                self._bubbles.rest()
+            if self._safety.handle(_EVENT_ESTOP if bits & _ESTOP else _EVENT_BOARD_FAULT):
+                self._bubbles.retract()
 
     def host_silent(self, event: int) -> None:
-        """The host has been silent for too long, QUIET or SILENT: hold what moves, or vent."""
-        if self._safety.take(event):
+        """The host has been silent for too long, HOST_QUIET or HOST_SILENT: hold what moves, or vent."""
+        if self._safety.handle(event):
             self._player.cancel()
-            self._faults.note(_HOST_SILENT, self._safety.silent * (self._tick_us // 1000))
+            self._faults.note(_HOST_SILENT, self._deadman.silent_ticks * (self._tick_us // 1000))
             if self._safety.mode == _HOLDING:
-                self._bubbles.hold()
+                self._bubbles.hold_position()
             else:
-                self._bubbles.rest()
+                self._bubbles.retract()
 
     def finish(self, then: int) -> None:
         """A sequence has ended at a step that did not settle, and wants this done; GO_ON: it has not."""
@@ -126,6 +128,6 @@ class Commands:
         """An exception has ended the tick: vent."""
         self._hal.safe_outputs()  # first of all
         self._faults.latch_board(_EXCEPTION)
-        self._safety.take(_EVENT_FAILED)
+        self._safety.handle(_EVENT_EXCEPTION)
         self._player.cancel()
-        self._bubbles.rest()
+        self._bubbles.retract()

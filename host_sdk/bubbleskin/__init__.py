@@ -39,7 +39,8 @@ if TYPE_CHECKING:
         preset,
         read_csv,
     )
-    from bubbleskin.planner.search import Plan, plan
+    from bubbleskin.planner.plan import Plan
+    from bubbleskin.planner.search import plan
 
 # The physics takes scipy, which takes a second to import, and contact takes numba; a script that only shows heights
 # need not wait for them.
@@ -48,7 +49,7 @@ _LATER = {
     "CompliantContact": "contact.model",
     "ContactFit": "contact.fit",
     "Measured": "contact.fit",
-    "Plan": "planner.search",
+    "Plan": "planner.plan",
     "RigidContact": "contact.rigid",
     "Shape": "contact.model",
     "Table": "membrane",

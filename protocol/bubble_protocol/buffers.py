@@ -16,12 +16,12 @@ def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
         start += 1
 
 
-# CPython loops over bytes slowly, but slices in C.
-if not COMPILED:  # type: ignore[misc]
+if not COMPILED:  # CPython loops over bytes slowly, but slices in C
 
-    def copy(source: "Buffer", start: int, end: int, target: bytearray, at: int) -> None:
-        """As above."""
+    def _copy_in_slices(source: "Buffer", start: int, end: int, target: bytearray, at: int) -> None:
         target[at : at + end - start] = source[start:end]
+
+    copy = _copy_in_slices
 
 
 def put16(data: bytearray, at: int, value: int) -> None:

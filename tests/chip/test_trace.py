@@ -11,7 +11,8 @@ import pytest
 
 from bubble_firmware import boards
 from bubbleskin.link.link import run_sync
-from bubbleskin.sim.board import InProcessFirmware, SimulatedBoard
+from bubbleskin.sim.board import SimulatedBoard
+from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin
 from bubbleskin.toolchain.rp2040 import BARE

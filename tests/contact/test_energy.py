@@ -54,15 +54,15 @@ def test_gradient_is_that_of_the_energy(model):
 def test_curvature_is_that_of_the_gradient(model):
     rng = np.random.default_rng(2)
     state, pressure = crowded(model, rng)
-    walker = PathFollower(model.bubbles, model.springs, state)
-    walker.reach(10e-3)
-    blocks, contacts = np.empty((7, 4, 4)), np.empty((len(walker.pairs), 5))
-    core.curvature(state, pressure, model.bubbles, walker.springs, walker.pairs, blocks, contacts)
+    follower = PathFollower(model.bubbles, model.springs, state)
+    follower.find_pairs(10e-3)
+    blocks, contacts = np.empty((7, 4, 4)), np.empty((len(follower.pairs), 5))
+    core.curvature(state, pressure, model.bubbles, follower.springs, follower.pairs, blocks, contacts)
     assert (contacts[:, 3] > 0).sum() >= 3  # else nothing is tested
     for _ in range(5):
         v = rng.normal(0, 1, (7, 4))
         Hv = np.empty((7, 4))
-        core.hessian(v, walker.pairs, blocks, contacts, Hv)
+        core.hessian(v, follower.pairs, blocks, contacts, Hv)
         h = 1e-8
         numeric = (model.gradient(state + h * v, pressure) - model.gradient(state - h * v, pressure)) / (2 * h)
         np.testing.assert_allclose(Hv, numeric, rtol=0, atol=2e-6 * np.abs(Hv).max())
@@ -107,11 +107,11 @@ def test_energy_never_rises_along_a_relaxation(model):
     rng = np.random.default_rng(3)
     for _ in range(20):
         state, pressure = crowded(model, rng)
-        walker = PathFollower(model.bubbles, model.springs, state)
-        walker.reach(12e-3)
+        follower = PathFollower(model.bubbles, model.springs, state)
+        follower.find_pairs(12e-3)
         trace = np.empty(401)
         ended, force, steps, _ = relax(
-            state, pressure, model.bubbles, walker.springs, walker.pairs, 0.3e-3, 1e-7, 400, trace
+            state, pressure, model.bubbles, follower.springs, follower.pairs, 0.3e-3, 1e-7, trace
         )
         assert ended == CONVERGED
         assert force <= 1e-7
@@ -124,10 +124,10 @@ def test_plant_needs_only_the_mechanics():
     """What `mechanics` leaves out is air against membrane, along R alone."""
     model = bs.CompliantContact(bs.Layout.hexagon(1))
     state, pressure = crowded(model, np.random.default_rng(4))
-    walker = PathFollower(model.bubbles, model.springs, state)
-    walker.reach(10e-3)
+    follower = PathFollower(model.bubbles, model.springs, state)
+    follower.find_pairs(10e-3)
     g = np.zeros((7, 4))
-    core.mechanics(state, model.bubbles, walker.springs, walker.pairs, g)
+    core.mechanics(state, model.bubbles, follower.springs, follower.pairs, g)
     rest = model.gradient(state, pressure) - g
     assert np.abs(rest[:, :3]).max() == 0
     R = state[:, 3]

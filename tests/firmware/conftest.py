@@ -8,7 +8,7 @@ import pytest
 
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_firmware.control.step import ROW, SETPOINT
+from bubble_firmware.control.state_layout import ROW_WORDS, SETPOINT
 from bubble_firmware.hal.base import Hal
 from bubble_protocol import codec, steps
 from bubble_protocol.schema import messages
@@ -99,7 +99,7 @@ class Rig:
     def tick(self, ticks=1):
         """Let periods pass, with a host that lives."""
         for _ in range(ticks):
-            self.app.safety.heard()
+            self.app.deadman.host_activity()
             self.app.tick()
 
     def heard(self):
@@ -284,7 +284,7 @@ class Sequencer:
     def setpoints(self):
         """µm, where the ramps are now."""
         rows = self.rig.app.bubbles.rows
-        return [rows[i * ROW + SETPOINT] / 16 for i in range(self.n)]
+        return [rows[i * ROW_WORDS + SETPOINT] / 16 for i in range(self.n)]
 
 
 @pytest.fixture

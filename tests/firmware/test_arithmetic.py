@@ -3,116 +3,43 @@
 import math
 import random
 from array import array
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from bubble_firmware import boards
-from bubble_firmware.control import curve, nominal, table
+from bubble_firmware.control import curve, flow, table
+from bubble_firmware.control import state_layout as layout
 from bubble_firmware.control import step as control
 from bubble_firmware.control.bubbles import Bubbles
-from bubble_firmware.safety import fault_monitor
 from bubble_protocol import codec
-from bubble_protocol.schema import faults, modes, statuses
 from bubbleskin import Table, YeohBalloon, build_table
 
 BOARD = boards.load("wristband7")
 ATMOSPHERE = 101325.0
-
-SCHEMA = [entry[1].upper() for entry in (*modes.MODES, *statuses.STATUSES, *faults.FAULTS)]
-REPEATED = [name for name in SCHEMA if hasattr(control, name)]
+AIR_MAX = 400_000  # µJ: keeps every product of the control law within 32 bits
 
 
-def test_what_control_repeats_of_the_schema_is_the_schemas():
-    """It repeats them because MicroPython's compiler folds constants of the same module only."""
-    said = {**vars(modes), **vars(statuses), **vars(faults)}
-    assert {name: getattr(control, name) for name in REPEATED} == {name: said[name] for name in REPEATED}
-    known = {name: said[name] for name in SCHEMA if hasattr(fault_monitor, name)}
-    assert {name: getattr(fault_monitor, name) for name in known} == known
-    assert set(SCHEMA) <= {*REPEATED, *known, "IDLE", "HOLDING", "BOOT", "VENTING", "FAULTED"}
+def names_of(module):
+    """The places that a module names, as (name, place), in the order in which it names them."""
+    return [(name, place) for name, place in vars(module).items() if name.isupper()]
 
 
-def test_what_the_guard_repeats_of_control_is_controls():
-    lines = Path(fault_monitor.__file__).read_text(encoding="utf-8").split("# From the schema")[0].splitlines()
-    names = [line.split(" = const(")[0] for line in lines if " = const(" in line]
-    assert len(names) > 15
-    assert {name: getattr(fault_monitor, name) for name in names} == {name: getattr(control, name) for name in names}
-
-
-def test_the_guards_rows_do_not_overlap():
-    lines = Path(fault_monitor.__file__).read_text(encoding="utf-8").splitlines()
-    names = [line.split(" = const(")[0] for line in lines if " = const(" in line]
-    for first, end in (("WAS_AIR", "GUARD"), ("ALLOWED", "NUMBERS")):
-        row = names[names.index(first) : names.index(end) + 1]
-        assert [getattr(fault_monitor, name) for name in row] == list(range(len(row)))
-
-
-def test_rows_do_not_overlap():
-    """Every place of a bubble's row and of the board's numbers has one name."""
-    lines = Path(control.__file__).read_text(encoding="utf-8").splitlines()
-    names = [line.split(" = const(")[0] for line in lines if " = const(" in line]
-    row = names[names.index("ZERO") : names.index("SETPOINT")]
-    places = [getattr(control, name) for name in row]
-    assert places == list(range(len(row)))
-    record = max(control.SEGMENT, control.SLOPE, control.MODEL, control.CONTENT)
-    assert record + 1 == control.SETPOINT - control.HEIGHT
-    rest = names[names.index("START") : names.index("ROW")]
-    assert [getattr(control, name) for name in rest] == list(range(control.SETPOINT + record + 1, control.ROW))
-    board = names[names.index("N") : names.index("BOARD")]
-    assert [getattr(control, name) for name in board] == list(range(control.BOARD))
-    assert control.ROOTS == control.BOARD
-    assert len(curve.roots(128)) == 2 * (control.STEPS + 1) == control.ROWS - control.ROOTS
-    knot = [getattr(control, name) for name in ("H", "A", "P", "S", "R", "KNOT")]
-    assert knot == [getattr(curve, f"_{name}") for name in ("H", "A", "P", "S", "R", "KNOT")] == list(range(6))
+def test_every_place_of_the_state_has_one_name():
+    names = names_of(layout)
+    places = dict(names)
+    order = [name for name, _ in names]
+    for first, size in (("SENSOR_ZERO", "ROW_WORDS"), ("KNOT_HEIGHT", "KNOT_WORDS"), ("BUBBLE_COUNT", "BOARD_WORDS")):
+        record = order[order.index(first) : order.index(size) + 1]
+        assert [places[name] for name in record] == list(range(len(record)))
+    assert layout.ROOTS == layout.BOARD_WORDS
+    assert len(flow.roots(128)) == 2 * (layout.ROOT_STEPS + 1) == layout.ROWS - layout.ROOTS
 
 
 def test_the_state_is_in_the_schemas_order():
-    """`gather` fills in the repeated fields of STATE by place."""
+    """`pack_state` fills in the repeated fields of STATE by place."""
     names = [field[0] for field in codec.BY_NAME["STATE_REPLY"].repeated]
     assert names == ["height_um", "pressure_pa", "target_um", "status", "faults"]
-
-
-# Tables.
-
-
-def packed(heights, pressures):
-    return bytearray(np.stack([heights, pressures], axis=1).astype("<u2").tobytes())
-
-
-@st.composite
-def any_table(draw):
-    heights = sorted(draw(st.sets(st.integers(1, 16000), min_size=2, max_size=64)))
-    pressures = draw(st.lists(st.integers(0, 42000), min_size=len(heights), max_size=len(heights)))
-    return Table(np.array(heights), np.array(pressures))
-
-
-@settings(max_examples=40)
-@given(any_table(), st.lists(st.integers(0, 20000), max_size=30), st.integers(0, 3))
-def test_a_tables_pressure_is_the_sdks(mine, heights, first):
-    knots = bytearray(4 * first) + packed(mine.height_um, mine.pressure_pa)
-    for height in [*heights, *mine.height_um.tolist()]:
-        assert table.pressure_at(knots, first, len(mine), height) == mine.pressure_at(height)
-
-
-def test_on_micropython_too(micropython):
-    said = micropython(
-        """
-        from bubble_firmware.control import nominal, table
-        knots = bytearray(b"".join(h.to_bytes(2, "little") + p.to_bytes(2, "little") for h, p in nominal.KNOTS))
-        total = 0
-        for height in range(4000, 15000):
-            total = (total * 31 + table.pressure_at(knots, 0, len(nominal.KNOTS), height)) % 1000003
-        print(total)
-        """
-    )
-    mine = Table(*np.array(nominal.KNOTS).T)
-    total = 0
-    for height in range(4000, 15000):
-        total = (total * 31 + mine.pressure_at(height)) % 1000003
-    assert int(said) == total
 
 
 # Air.
@@ -126,8 +53,8 @@ def bubbles_with(knots):
         tables.write_knot(0, index, int(height), int(pressure))
     tables.swap()
     bubbles = Bubbles(BOARD, tables)
-    size = bubbles._rows[control.LAST] // 4 // control.KNOT + 2
-    return bubbles, np.array(bubbles._curves[: size * control.KNOT]).reshape(size, control.KNOT)
+    size = bubbles.rows[layout.LAST_SEGMENT] // 4 // layout.KNOT_WORDS + 2
+    return bubbles, np.array(bubbles.curves[: size * layout.KNOT_WORDS]).reshape(size, layout.KNOT_WORDS)
 
 
 def air(height_um, pressure):
@@ -146,27 +73,30 @@ def test_a_curve_says_of_the_table_what_a_sphere_holds(name):
     """pV in µJ and its slope in µJ/µm, from 5 to 14 mm, against floats and the exact segment."""
     made = TABLES[name]
     _, knots = bubbles_with(list(zip(made.height_um, made.pressure_pa, strict=True)))
-    h = knots[:, control.H] / 16
+    h = knots[:, layout.KNOT_HEIGHT] / 16
     assert np.diff(h).max() <= 1024
     assert set(made.height_um) <= set(h)
-    assert np.abs(knots[:, control.P] - np.interp(h, made.height_um, made.pressure_pa)).max() <= 1
+    assert np.abs(knots[:, layout.KNOT_PRESSURE] - np.interp(h, made.height_um, made.pressure_pa)).max() <= 1
 
     heights = np.arange(5000.0, 14000.0, 7.0)
     exact = air(heights, np.interp(heights, made.height_um, made.pressure_pa))
-    slope = np.diff(knots[:, control.A]) / np.diff(h)
-    off = np.abs(np.interp(heights, h, knots[:, control.A]) - exact) / slope[np.searchsorted(h, heights, "right") - 1]
+    slope = np.diff(knots[:, layout.KNOT_AIR]) / np.diff(h)
+    off = (
+        np.abs(np.interp(heights, h, knots[:, layout.KNOT_AIR]) - exact)
+        / slope[np.searchsorted(h, heights, "right") - 1]
+    )
     print(f"{name}: air within {off.max():.1f} µm of height")
     assert off.max() < (35 if name == "sparse" else 6)
-    assert knots[:-1, control.S] == pytest.approx(256 * slope, rel=1e-3)
-    assert knots[:-1, control.R] == pytest.approx(2**28 / knots[:-1, control.S], abs=1)
+    assert knots[:-1, layout.KNOT_SLOPE] == pytest.approx(256 * slope, rel=1e-3)
+    assert knots[:-1, layout.KNOT_RECIPROCAL] == pytest.approx(2**28 / knots[:-1, layout.KNOT_SLOPE], abs=1)
 
 
 def test_air_rises_whatever_the_table():
     for knots in extreme_tables(random.Random(0)):
         _, made = bubbles_with(knots)
-        assert (np.diff(made[:, control.H]) > 0).all()
-        assert (np.diff(made[:, control.A]) > 0).all()
-        assert made[:, control.A].max() < control.AIR_MAX
+        assert (np.diff(made[:, layout.KNOT_HEIGHT]) > 0).all()
+        assert (np.diff(made[:, layout.KNOT_AIR]) > 0).all()
+        assert made[:, layout.KNOT_AIR].max() < AIR_MAX
         assert len(made) <= curve.KNOTS_MAX
 
 
@@ -179,10 +109,10 @@ def test_pressure_is_read_back_as_the_tables_height(name):
     for step in range(0, int(made.pressure_pa.max()) // BOARD.SENSOR_PA_PER_COUNT, 7):
         counts[0] = BOARD.SENSOR_ZERO + step
         for _ in range(9):
-            bubbles.step(counts, 60000, modes.IDLE)
+            bubbles.step(counts, 60000, layout.VENT)
         pressure = step * BOARD.SENSOR_PA_PER_COUNT
         assert (
-            bubbles._rows[control.HEIGHT] / 16
+            bubbles.rows[layout.HEIGHT] / 16
             == pytest.approx(np.interp(pressure, made.pressure_pa, made.height_um), abs=8 if name == "sparse" else 4)
             or name == "soft"
         )
@@ -191,7 +121,7 @@ def test_pressure_is_read_back_as_the_tables_height(name):
 @pytest.mark.parametrize("critical", [77, 128])
 def test_roots_are_those_of_iso_6358(critical):
     b = critical / 256
-    filling, venting = np.array(curve.roots(critical)).reshape(2, control.STEPS + 1)
+    filling, venting = np.array(flow.roots(critical)).reshape(2, layout.ROOT_STEPS + 1)
 
     def root(p1, p2):
         p2 = np.maximum(p2, b * p1)  # choked
@@ -286,7 +216,8 @@ def test_nothing_overflows_32_bits(rig7, seed):
                 0,
                 chance.choice([0, 60000]),
             )
-            rig7.app.bubbles.clear_faults()
+            for bubble in range(7):
+                rig7.app.bubbles.clear_faults(bubble)
             for _ in range(12):
                 rig7.hal.counts = [chance.choice([9, 160, 1500, 2600, 4086, chance.randrange(4096)]) for _ in range(8)]
                 rig7.app._control()  # not `tick`, which would catch what we look for

@@ -16,7 +16,7 @@ SESSION = 0x13579BDF
 SCRIPT = """
 import gc, sys
 from bubble_firmware import boards
-from bubble_firmware.control import step as control
+from bubble_firmware.control import state_layout as layout
 from bubble_firmware.app import App
 from bubble_firmware.hal.base import Hal
 
@@ -60,8 +60,8 @@ for line in sys.stdin:
     frames += 1
     unanswered += hal.answers != before + 1
     for bubble in range(board.BUBBLES):
-        at = bubble * control.ROW
-        if not 0 <= rows[at + control.TARGET] <= limit or rows[at + control.SETPOINT] > limit << 4:
+        at = bubble * layout.ROW_WORDS
+        if not 0 <= rows[at + layout.TARGET] <= limit or rows[at + layout.SETPOINT] > limit << 4:
             beyond += 1
     if frames == 300:
         line = frame = None

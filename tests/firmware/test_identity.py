@@ -14,7 +14,7 @@ from bubble_protocol import steps
 from bubble_protocol.schema import faults, messages, sequences
 from bubbleskin.link.message import Reader, encode, session_key
 from bubbleskin.sim import SimulatedBoard
-from bubbleskin.sim.board import InProcessFirmware
+from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.micropython import MicroPythonFirmware
 
 BOOT_ID = 0x87654321

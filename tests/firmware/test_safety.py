@@ -247,7 +247,7 @@ def test_the_outputs_are_safe_before_anything_else_is_tried(rig7, monkeypatch):
 
     hold(rig7)
     rig7.hal.broken.add("read_sensors")
-    monkeypatch.setattr(rig7.app.bubbles, "rest", fail)
+    monkeypatch.setattr(rig7.app.bubbles, "retract", fail)
     with pytest.raises(MemoryError):
         rig7.tick()
     assert rig7.hal.safe

@@ -44,20 +44,20 @@ def test_whatever_happens_the_emergency_stop_wins_and_a_fault_is_cleared_before_
     class Board:
         TICK_US = 5000
 
-    state = safety.Safety(Board)
+    state = safety.SafetyState(Board)
     standing = None  # what has to be acknowledged
     for event in events:
-        state.take(event)
+        state.handle(event)
         if event == safety.ESTOP:
             standing = STOPPED
-        elif event == safety.FAULT and standing is None:
+        elif event == safety.BOARD_FAULT and standing is None:
             standing = FAULTED
         elif event == safety.CLEAR:
             standing = None
         assert (state.mode == standing) if standing is not None else state.mode not in (STOPPED, FAULTED)
-        assert state.drive == {ACTIVE: 1, HOLDING: 2}.get(state.mode, 0)
-        if event in (safety.VENT, safety.SILENT, safety.FAILED):
-            assert state.drive == 0
+        assert state.control_mode == {ACTIVE: 1, HOLDING: 2}.get(state.mode, 0)
+        if event in (safety.VENT, safety.HOST_SILENT, safety.EXCEPTION):
+            assert state.control_mode == 0
     assert state.mode in {number for number, _, _ in modes.MODES}
 
 
@@ -79,7 +79,7 @@ def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, thin
         elif "silence" in thing:
             silence(rig, 210 if "long" in thing else 55)
             if "long" in thing:
-                assert rig.app.safety.drive == 0
+                assert rig.app.safety.control_mode == 0
         elif thing == "tick":
             rig.tick(3)
         elif thing == "SHOW":

@@ -11,7 +11,8 @@ import pytest
 
 from bubbleskin.errors import LinkError
 from bubbleskin.flash import uf2
-from bubbleskin.sim.board import InProcessFirmware, SimulatedBoard, load_board
+from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.rp2040 import boot_rom
 from bubbleskin.sim.transport import SimulatedTransport
 

@@ -16,7 +16,7 @@ from bubbleskin.flash.prompt import Prompt
 from bubbleskin.toolchain import rp2040
 
 pytest.importorskip("rp2040py")
-from bubbleskin.sim.rp2040.machine import PORT, EmulatedMachine
+from bubbleskin.flash.emulated import PORT, EmulatedMachine
 
 pytestmark = [pytest.mark.chip, pytest.mark.slow, pytest.mark.long]
 
@@ -94,7 +94,7 @@ def restart(machine, prompt) -> None:
 def flashed(stock, tmp_path_factory):
     """A machine with the firmware "old" on its board, and files of the user's."""
     folder = tmp_path_factory.mktemp("old")
-    machine = EmulatedMachine(stock, folder / "drive")
+    machine = EmulatedMachine("wristband7", stock, folder / "drive")
     prompt = prompt_of(machine)
     for name, data in STORED.items():
         prompt.write(name, data)
@@ -146,7 +146,7 @@ class Journal:
 
 
 def test_power_may_be_cut_between_any_two_writes_and_in_the_middle_of_each(flashed, tmp_path):
-    machine = EmulatedMachine(flashed, tmp_path / "drive")
+    machine = EmulatedMachine("wristband7", flashed, tmp_path / "drive")
     journal = Journal()
     machine.on_chip = journal.watch
     new = firmware("new", tmp_path)
@@ -158,7 +158,7 @@ def test_power_may_be_cut_between_any_two_writes_and_in_the_middle_of_each(flash
     every = int(os.environ.get("BUBBLESKIN_CUTS", "40"))  # 1: all of them, an hour; test_power.py tries all elsewhere
     seen = []
     for number, state in [*itertools.islice(enumerate(states), 0, None, every), (len(states) - 1, states[-1])]:
-        board = EmulatedMachine(state, tmp_path / "drive")
+        board = EmulatedMachine("wristband7", state, tmp_path / "drive")
         prompt = prompt_of(board)
         runs = who(prompt)
         assert runs in ("old", "new"), f"after {number} of {len(states)} states"
@@ -174,7 +174,7 @@ def test_power_may_be_cut_between_any_two_writes_and_in_the_middle_of_each(flash
 
 
 def test_firmware_that_does_not_start_leaves_the_old_one_in_use(flashed, tmp_path):
-    machine = EmulatedMachine(flashed, tmp_path / "drive")
+    machine = EmulatedMachine("wristband7", flashed, tmp_path / "drive")
     with pytest.raises(BubbleskinError, match="ImportError"):
         update(machine, firmware("broken", tmp_path, start="import nothing"))
     assert who(prompt_of(machine)) == "old"
@@ -185,7 +185,7 @@ def test_firmware_that_does_not_start_leaves_the_old_one_in_use(flashed, tmp_pat
 
 
 def test_a_trial_is_a_trial_once(flashed, tmp_path):
-    machine = EmulatedMachine(flashed, tmp_path / "drive")
+    machine = EmulatedMachine("wristband7", flashed, tmp_path / "drive")
     prompt = prompt_of(machine)
     there = slots.look(prompt)
     slot = slots.write(prompt, there, firmware("new", tmp_path), lambda *_: None)
@@ -197,7 +197,7 @@ def test_a_trial_is_a_trial_once(flashed, tmp_path):
 
 
 def test_a_full_board_is_told_from_before(flashed, tmp_path):
-    machine = EmulatedMachine(flashed, tmp_path / "drive")
+    machine = EmulatedMachine("wristband7", flashed, tmp_path / "drive")
     files = firmware("new", tmp_path)
     files = {"large.mpy": bytes(1500 << 10), **files}
     with pytest.raises(

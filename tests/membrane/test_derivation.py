@@ -39,7 +39,7 @@ def test_thick_wall_antiderivative():
     for power, constants in ((1, (2.0, 0.0, 0.0)), (2, (0.0, 1.0, 0.0)), (3, (0.0, 0.0, 1.0))):
         integrand = sp.cancel(sp.diff(J**power, x) / (x**3 - 1))
         theirs = sp.lambdify(x, sp.integrate(sp.expand(integrand), x), "numpy")(X)
-        ours = walls._antiderivative(X, *constants)
+        ours = walls.pressure_antiderivative(X, *constants)
         np.testing.assert_allclose(ours - ours[0], theirs - theirs[0], rtol=1e-12, atol=1e-12)
 
 

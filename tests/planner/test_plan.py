@@ -7,7 +7,8 @@ import pytest
 
 import bubbleskin as bs
 from bubbleskin.errors import InvalidInput
-from bubbleskin.planner.inverse import correct, pairs, steps_of, triples
+from bubbleskin.planner.inverse import correct
+from bubbleskin.planner.orders import steps_of, three_groups, two_groups
 
 P = 26.69e3
 ALL = np.full(7, P)
@@ -161,10 +162,10 @@ def test_correction_meets_heights_or_comes_nearer(model, up):
 
 def test_orders_are_orders(up):
     """Each of the 126 ways to choose a first group of 7, once; and every group of three holds somebody."""
-    twos = list(pairs(up, up.pressure, LAYOUT.neighbours, [0]))
+    twos = list(two_groups(up, up.pressure, LAYOUT.neighbours, [0]))
     assert len(twos) == len(set(twos)) == 126
     assert twos[0] == ((0,), (1, 2, 3, 4, 5, 6))
-    for order in triples(twos[:10], [0]):
+    for order in three_groups(twos[:10], [0]):
         assert sorted(i for group in order for i in group) == list(range(7))
 
 

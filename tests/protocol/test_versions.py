@@ -16,7 +16,7 @@ from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import FRAME_MAX, Decoder, finish_frame
 from bubble_protocol.schema import messages
 from bubbleskin.link.message import Reader, session_key
-from bubbleskin.sim.board import InProcessFirmware
+from bubbleskin.sim.firmware import InProcessFirmware
 
 RECORDED = sorted((Path(__file__).parent / "sessions").glob("*.json"))
 every_version = pytest.mark.parametrize("path", RECORDED, ids=lambda path: path.stem)

@@ -15,7 +15,7 @@ from bubble_firmware.link.server import Server
 from bubble_protocol.schema import messages
 from bubbleskin.link.link import Link, run_sync
 from bubbleskin.link.send_window import Request
-from bubbleskin.sim import Faults, LossyTransport
+from bubbleskin.sim import Impairment, LossyTransport
 
 TOOLS = Path(__file__).parents[2] / "tools/stress"
 
@@ -37,7 +37,7 @@ def test_thousands_of_commands_over_a_line_that_fails(commands):
     assert result.problems == []
     assert len(result.journals) > commands // 3000
     assert result.told.count(soak.APPLIED) > 0.9 * commands
-    assert min(count for fault, count in result.faults.items() if fault != "stall") > commands // 1000
+    assert min(count for kind, count in result.impairments.items() if kind != "stall") > commands // 1000
 
 
 def test_a_device_that_forgets_replies_would_be_found_out(monkeypatch):
@@ -64,8 +64,8 @@ class ExactlyOnce(RuleBasedStateMachine):
     @initialize(seed=st.integers(0, 1000))
     def begin(self, seed):
         self.device = soak.Device()
-        faults = Faults(drop=0.2, duplicate=0.1, flip=0.05, reorder=0.1, truncate=0.05, split=0.1)
-        self.line = LossyTransport(self.device, faults, seed=seed)
+        impairment = Impairment(drop=0.2, duplicate=0.1, flip=0.05, reorder=0.1, truncate=0.05, split=0.1)
+        self.line = LossyTransport(self.device, impairment, seed=seed)
         self.line.on = False
         self.link = Link(self.line, 1.0)
         run_sync(self.link.hello())

@@ -56,7 +56,7 @@ def test_a_killed_process_is_noticed():
     def run():
         app = board.firmware.app
         for _ in serve(board, end, lambda: running):
-            seen.append((app.clock.ticks, app.safety.silent, app.safety.mode))
+            seen.append((app.clock.ticks, app.deadman.silent_ticks, app.safety.mode))
 
     thread = threading.Thread(target=run)
     thread.start()

@@ -7,7 +7,7 @@ import pytest
 
 import bubbleskin as bs
 from bubbleskin.link.link import Link, run_sync
-from bubbleskin.sim import Faults, LossyTransport, SimulatedBoard, SimulatedTransport
+from bubbleskin.sim import Impairment, LossyTransport, SimulatedBoard, SimulatedTransport
 from bubbleskin.skin import AsyncSkin
 
 pytestmark = pytest.mark.timeout(60)
@@ -30,7 +30,7 @@ def journal(board):
 def test_overtaken_or_applied_and_nothing_after(urgent, seed):
     board = SimulatedBoard("wristband7")
     applied = journal(board)
-    line = LossyTransport(SimulatedTransport(board, "sim"), Faults(drop=0.2, reorder=0.1), seed=seed)
+    line = LossyTransport(SimulatedTransport(board, "sim"), Impairment(drop=0.2, reorder=0.1), seed=seed)
 
     async def script():
         skin = await AsyncSkin.open(line, 2.0, event_loop=True)
@@ -73,7 +73,7 @@ def test_a_cancelled_call_leaves_no_gap(before):
     """Cancelled before it was sent it never is; after that it is seen through, so that the window stays open."""
     board = SimulatedBoard("wristband7")
     applied = journal(board)
-    line = LossyTransport(SimulatedTransport(board, "sim"), Faults(drop=0.2), seed=before)
+    line = LossyTransport(SimulatedTransport(board, "sim"), Impairment(drop=0.2), seed=before)
 
     async def script():
         skin = await AsyncSkin.open(line, 2.0, event_loop=True)

@@ -344,7 +344,7 @@ def test_sensors_read_the_nodes_with_their_noise():
     assert np.std(supply) == pytest.approx(50.0, rel=0.15)
 
 
-def test_sensor_faults():
+def test_sensor_failures():
     plant = make(4)
     plant.rest_at(10.0)
     healthy = int(plant.sense()[0])
@@ -384,5 +384,5 @@ def test_a_leak_is_proportional_to_pressure_and_a_bubble_off_its_barb_is_flat_at
     assert plant.pressure_pa[1] < 100.0
     assert plant.height_mm[1] < 5.1
     assert lost[2] == 0.0
-    with pytest.raises(InvalidInput, match="no fault is called 'gremlin'; choose one of leak"):
+    with pytest.raises(InvalidInput, match="no failure is called 'gremlin'; choose one of leak"):
         plant.inject("gremlin", 0, 1.0)

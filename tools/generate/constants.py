@@ -13,9 +13,10 @@ costs no memory on the device:
     ...
     # [end of constants]
 
-`module: NAMES`, or `*` for all whole numbers of the module whose names are capital letters. `message NAME as PREFIX`
+`module: NAMES`, or `*` for all whole numbers of the module whose names are capital letters, or `used` for those of them
+that the file uses outside its regions, under a leading underscore. `message NAME as PREFIX`
 gives the places of the message's fields in the values of a handler: `_INFO_LATE_TICKS`; of a repeated field the place
-in the first repetition, and `_INFO_STRIDE` values from one repetition to the next. Fields are chosen by name, or `*`.
+in the first repetition, and `_INFO_STRIDE` values from one repetition to the next. Fields are chosen in the same ways.
 """
 
 import re
@@ -47,8 +48,8 @@ def places(name: str) -> dict[str, int]:
     return found
 
 
-def wanted(line: str) -> dict[str, int]:
-    """The constants that one `# [constants]` line asks for, by their names in the device's file."""
+def wanted(line: str, words: set[str]) -> dict[str, int]:
+    """The constants that one `# [constants]` line asks for, by their names in the device's file, whose `words` are these."""
     source, _, names = line.removeprefix("# [constants] ").partition(":")
     prefix = ""
     if source.startswith("message "):
@@ -58,8 +59,9 @@ def wanted(line: str) -> dict[str, int]:
     else:
         values = vars(import_module(source))
         known = {name: value for name, value in values.items() if name.isupper() and type(value) is int}
-    if names.strip() == "*":
-        return {f"_{prefix}{name}": value for name, value in known.items() if not name.startswith("_")}
+    if names.strip() in ("*", "used"):
+        ours = {f"_{prefix}{name}": value for name, value in known.items() if not name.startswith("_")}
+        return ours if names.strip() == "*" else {name: value for name, value in ours.items() if name in words}
     found = {}
     for name, _, alias in re.findall(r"(\w+)( as (\w+))?", names):
         if name.upper() not in known:
@@ -70,12 +72,13 @@ def wanted(line: str) -> dict[str, int]:
 
 def filled(text: str) -> str:
     """The text of a device file with all its regions as they should be."""
+    words = set(re.findall(r"\w+", REGION.sub("", text)))
 
     def region(match: re.Match[str]) -> str:
         lines = match["head"].splitlines()
         constants: dict[str, int] = {}
         for line in lines:
-            constants.update(wanted(line))
+            constants.update(wanted(line, words))
         body = "".join(f"{name} = const({value})\n" for name, value in constants.items())
         return match["head"] + body + "# [end of constants]\n"
 

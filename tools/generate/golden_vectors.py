@@ -24,7 +24,7 @@ from bubble_firmware import boards
 from bubble_protocol import codec, frame, version
 from bubble_protocol.schema import messages
 from bubbleskin.link import message
-from bubbleskin.sim.board import InProcessFirmware
+from bubbleskin.sim.firmware import InProcessFirmware
 
 PATH = Path("tests/protocol/golden.json")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import generated
 
-from bubble_firmware.safety.state import EVENTS, Safety
+from bubble_firmware.safety.state import EVENTS, SafetyState
 from bubble_protocol.schema import modes
 
 PATH = Path("docs/safety.md")
@@ -22,9 +22,9 @@ def changes() -> dict[tuple[int, int], list[str]]:
     found: dict[tuple[int, int], list[str]] = {}
     for event, text in EVENTS:
         for mode in NAMES:
-            state = Safety.__new__(Safety)
+            state = SafetyState.__new__(SafetyState)
             state.mode = mode
-            if state.take(event):
+            if state.handle(event):
                 found.setdefault((mode, state.mode), []).append(text)
     return found
 
@@ -39,9 +39,9 @@ def drawing() -> str:
     for number, name, meaning in modes.MODES:
         cells = []
         for event, _ in EVENTS:
-            state = Safety.__new__(Safety)
+            state = SafetyState.__new__(SafetyState)
             state.mode = number
-            cells.append(NAMES[state.mode] if state.take(event) else "")
+            cells.append(NAMES[state.mode] if state.handle(event) else "")
         lines.append(f"| **{name}** | {meaning} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import track
 
 import bubbleskin as bs
-from bubbleskin.planner.inverse import steps_of
+from bubbleskin.planner.orders import steps_of
 
 WITHIN_MM = 0.3
 FULL = 26.69e3  # Pa; 12.00 mm alone

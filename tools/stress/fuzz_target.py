@@ -9,7 +9,7 @@ from array import array
 
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_firmware.control import step
+from bubble_firmware.control import state_layout as layout
 from bubble_firmware.hal.base import Hal
 from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import FRAME_MAX, HEADER, PAYLOAD_MAX, finish_frame, put_header
@@ -68,9 +68,9 @@ class Device(Hal):
         assert app.stats.exceptions == 0, "an exception in the tick"
         rows = app.bubbles.rows
         limit = self.board.HEIGHT_MAX_UM
-        for row in range(0, step.ROW * self.board.BUBBLES, step.ROW):
-            assert 0 <= rows[row + step.TARGET] <= limit, "a target beyond the limit"
-            assert rows[row + step.SETPOINT] <= limit << 4, "a setpoint beyond the limit"
+        for row in range(0, layout.ROW_WORDS * self.board.BUBBLES, layout.ROW_WORDS):
+            assert 0 <= rows[row + layout.TARGET] <= limit, "a target beyond the limit"
+            assert rows[row + layout.SETPOINT] <= limit << 4, "a setpoint beyond the limit"
         assert max(self.pulses) <= self.board.TICK_US
 
     def answers(self) -> None:

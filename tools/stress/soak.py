@@ -24,9 +24,10 @@ from bubble_firmware.app import App
 from bubble_firmware.hal.base import Hal
 from bubbleskin.errors import BubbleskinError, DeviceRefused, DeviceRestarted, LinkError, Overtaken
 from bubbleskin.link.link import Link
-from bubbleskin.sim.faults import Faults, LossyTransport
+from bubbleskin.link.transport import Transport
+from bubbleskin.sim.impairment import Impairment, LossyTransport
 
-FAULTS = Faults(
+IMPAIRMENT = Impairment(
     drop=0.10, duplicate=0.05, flip=0.005, truncate=0.005, reorder=0.02, split=0.02, stall=0.0005, reset=0.01
 )
 WORKERS = 12
@@ -37,7 +38,7 @@ APPLIED, REFUSED, OVERTAKEN, RESTARTED, UNKNOWN, NOT_SENT = range(6)
 OUTCOMES = ("answered", "refused", "overtaken", "restarted, not applied", "outcome unknown", "not sent")
 
 
-class Device(Hal):
+class Device(Hal, Transport):
     """The firmware on a board at rest, and a `Transport` to it. Each boot has a journal."""
 
     name = "soak"
@@ -111,7 +112,7 @@ class Result:
     told: bytearray
     journals: list[array]
     virtual: float
-    faults: dict[str, int]
+    impairments: dict[str, int]
     problems: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -130,10 +131,10 @@ class Result:
             self.problems.append("something was applied that nobody asked for")
 
 
-def soak(commands: int, seed: int = 0, faults: Faults = FAULTS) -> Result:
+def soak(commands: int, seed: int = 0, impairment: Impairment = IMPAIRMENT) -> Result:
     """Send so many commands; see the module."""
     device = Device()
-    line = LossyTransport(device, faults, seed=seed, reset=device.reset)
+    line = LossyTransport(device, impairment, seed=seed, reset=device.reset)
     chance = random.Random(seed)
     told = bytearray(commands)
     numbers = iter(range(commands))
@@ -187,7 +188,7 @@ def main() -> None:
     for outcome, name in enumerate(OUTCOMES):
         print(f"  {result.told.count(outcome):8} {name}")
     print(f"  {sum(map(len, result.journals)):8} applied, in {len(result.journals)} boots")
-    print("faults of the line: " + ", ".join(f"{count} × {name}" for name, count in result.faults.items()))
+    print("impairments of the line: " + ", ".join(f"{count} × {name}" for name, count in result.impairments.items()))
     print(*result.problems[:20] or ["every command was applied as its caller was told"], sep="\n")
     sys.exit(bool(result.problems))
 

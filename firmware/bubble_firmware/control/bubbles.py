@@ -1,161 +1,241 @@
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """All bubbles of a board: their state, and what the rest of the firmware asks of them.
 
-The state is one array of integers, a row per bubble, laid out in `control`, which computes on it.
+The state is one array of integers, laid out in `state_layout`; `step` computes on it in every tick.
 """
 
 from array import array
 
-from bubble_firmware.control import curve
-from bubble_firmware.control import step as control
+from bubble_firmware.control import curve, flow, trajectory
+from bubble_firmware.control.step import step as control_step
 from bubble_firmware.control.table import KNOTS_MAX
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import const, micropython, ptr32, uint
 
-_ONE = const(32768)  # a whole way, in the shares of `advance`
+# [constants] bubble_firmware.control.state_layout: used
+_SENSOR_ZERO = const(0)
+_OPENS_US = const(1)
+_CLOSES_US = const(2)
+_FLOW_GAIN = const(3)
+_PRESSURE = const(4)
+_QUIESCENT = const(6)
+_DECIMATION_LEFT = const(7)
+_AIR = const(10)
+_FAULTS = const(21)
+_STATUS = const(22)
+_TARGET = const(23)
+_HEIGHT = const(24)
+_HEIGHT_SEGMENT = const(25)
+_SETPOINT = const(28)
+_SETPOINT_SEGMENT = const(29)
+_RAMP_START = const(32)
+_RAMPING = const(33)
+_HOLD_OUTPUT = const(34)
+_FIRST_SEGMENT = const(35)
+_LAST_SEGMENT = const(36)
+_LOWEST_PRESSURE = const(37)
+_HIGHEST_PRESSURE = const(38)
+_ROW_WORDS = const(41)
+_KNOT_AIR = const(1)
+_KNOT_WORDS = const(5)
+_BUBBLE_COUNT = const(0)
+_TICK_US = const(1)
+_PA_PER_COUNT = const(2)
+_COUNT_LOW = const(3)
+_COUNT_HIGH = const(4)
+_PRESSURE_MAX = const(5)
+_FILL_MAX_US = const(6)
+_PULSE_MIN_US = const(7)
+_QUIET_US = const(8)
+_TUBE_PA = const(9)
+_GAIN_P = const(10)
+_GAIN_I = const(11)
+_GAIN_D = const(12)
+_DEADBAND_UM = const(13)
+_SETTLED_UM = const(14)
+_REST_UM = const(15)
+_RAMP_DONE = const(18)
+_RAMP_TICKS = const(19)
+_RAMP_SHARE = const(20)
+_ROOTS = const(23)
+_ROWS = const(153)
+# [end of constants]
+
+_WHOLE_WAY = const(32768)  # in the shares of `advance`
+
+
+@micropython.viper
+def _pack_state(row: ptr32, values: ptr32, at: int, n: int):
+    """Copy what STATE and TELEMETRY say of every bubble to `values[at:]`, in the schema's order."""
+    while n > 0:
+        values[at] = row[_HEIGHT] >> 4
+        values[at + 1] = row[_PRESSURE]
+        values[at + 2] = row[_TARGET]
+        values[at + 3] = row[_STATUS]
+        values[at + 4] = row[_FAULTS]
+        at += 5
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)
+        n -= 1
+
+
+@micropython.viper
+def _pack_fields(row: ptr32, values: ptr32, plan: ptr32, at: int, columns: int, n: int):
+    """Copy the words of every row that `plan` names, shifted right by what stands 8 words after each name."""
+    while n > 0:
+        i = 0
+        while i < columns:
+            values[at] = row[plan[i]] >> plan[i + 8]
+            at += 1
+            i += 1
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)
+        n -= 1
 
 
 class Bubbles:
     """The bubbles of `board`. `pulses` are fill and vent µs of every bubble in the next period.
 
-    `step(counts, supply_pa, mode)` is the work of one tick: sensor counts in, estimates and `pulses` out.
+    `step(counts, supply_pa, control_mode)` is the work of one tick: sensor counts in, estimates and `pulses` out.
+    `state` is everything, `rows` and `curves` are its parts, for whoever knows `state_layout`.
     """
 
     def __init__(self, board, tables):
         n = board.BUBBLES
         self.count = n
         self.pulses = array("H", bytearray(4 * n))
-        curves = control.ROWS + control.ROW * n
+        curves = _ROWS + _ROW_WORDS * n
         # Made of a range, an array comes into being once; of a bytearray, twice, and there is no room for that.
-        state = array("i", range(curves + control.KNOT * curve.KNOTS_MAX * n))
+        state = array("i", range(curves + _KNOT_WORDS * curve.KNOTS_MAX * n))
         for index in range(curves):
             state[index] = 0
         view = memoryview(state)
-        self._board = state
-        self._rows = view[control.ROWS : curves]
-        self._curves = view[curves:]
+        self.state = state
+        self.rows = view[_ROWS:curves]
+        self.curves = view[curves:]
         self._tables = tables
-        self._dead = 64 * board.DEAD_VOLUME_MM3
-        self.rows, self.board = self._rows, self._board  # the guard looks at them
-        k = state
-        k[control.N] = n
-        k[control.TICK_US] = board.TICK_US
-        k[control.PA_PER_COUNT] = board.SENSOR_PA_PER_COUNT
-        k[control.COUNT_LOW] = board.COUNT_LOW
-        k[control.COUNT_HIGH] = board.COUNT_HIGH
-        k[control.REST_UM] = board.HEIGHT_REST_UM
-        k[control.PRESSURE_MAX] = board.PRESSURE_MAX_PA
-        k[control.FILL_MAX_US] = board.FILL_MAX_US
-        k[control.PULSE_MIN_US] = board.PULSE_MIN_US
-        k[control.QUIET_US] = board.QUIET_US
-        k[control.TUBE] = board.TUBE_PA_PER_FLOW
-        k[control.GAIN_P] = board.GAIN_P
-        k[control.GAIN_I] = board.GAIN_I
-        k[control.GAIN_D] = board.GAIN_D
-        k[control.DEADBAND_UM] = board.DEADBAND_UM
-        k[control.SETTLED_UM] = board.SETTLED_UM
-        k[control.RAMP_DONE] = k[control.RAMP_TICKS] = 1
-        k[control.RAMP_SHARE] = 4096
-        for index, root in enumerate(curve.roots(board.CRITICAL_RATIO)):
-            k[control.ROOTS + index] = root
-        row = self._rows
-        for at in range(0, n * control.ROW, control.ROW):
-            row[at + control.ZERO] = board.SENSOR_ZERO
-            row[at + control.OPENS_US] = board.VALVE_OPENS_US
-            row[at + control.CLOSES_US] = board.VALVE_CLOSES_US
-            row[at + control.FLOW_GAIN] = control.flow_gain(board)
-            row[at + control.TARGET] = row[at + control.START] = board.HEIGHT_REST_UM
-            row[at + control.HEIGHT] = row[at + control.SETPOINT] = board.HEIGHT_REST_UM << 4
-            row[at + control.WAIT] = -1
+        self._dead_volume = 64 * board.DEAD_VOLUME_MM3
+        self._take_up_board(board)
         self.use_tables()
-        for at in range(0, n * control.ROW, control.ROW):
-            row[at + control.AIR] = self._curves[row[at + control.FIRST] // 4 + control.A]
+        rows = self.rows
+        for at in range(0, n * _ROW_WORDS, _ROW_WORDS):
+            rows[at + _AIR] = self.curves[rows[at + _FIRST_SEGMENT] // 4 + _KNOT_AIR]
 
         # A default is a local: an attribute costs the chip 2.5 µs. More than 11 locals and values, and a call allocates.
-        def step(counts, supply_pa, mode, work=(control.step, row, state, self.pulses)):
-            work[0](work[1], work[2], counts, work[3], supply_pa, mode)
+        def step(counts, supply_pa, control_mode, work=(control_step, rows, state, self.pulses)):
+            work[0](work[1], work[2], counts, work[3], supply_pa, control_mode)
 
         self.step = step
 
+    def _take_up_board(self, board):
+        state = self.state
+        state[_BUBBLE_COUNT] = self.count
+        state[_TICK_US] = board.TICK_US
+        state[_PA_PER_COUNT] = board.SENSOR_PA_PER_COUNT
+        state[_COUNT_LOW] = board.COUNT_LOW
+        state[_COUNT_HIGH] = board.COUNT_HIGH
+        state[_REST_UM] = board.HEIGHT_REST_UM
+        state[_PRESSURE_MAX] = board.PRESSURE_MAX_PA
+        state[_FILL_MAX_US] = board.FILL_MAX_US
+        state[_PULSE_MIN_US] = board.PULSE_MIN_US
+        state[_QUIET_US] = board.QUIET_US
+        state[_TUBE_PA] = board.TUBE_PA_PER_FLOW
+        state[_GAIN_P] = board.GAIN_P
+        state[_GAIN_I] = board.GAIN_I
+        state[_GAIN_D] = board.GAIN_D
+        state[_DEADBAND_UM] = board.DEADBAND_UM
+        state[_SETTLED_UM] = board.SETTLED_UM
+        state[_RAMP_DONE] = state[_RAMP_TICKS] = 1
+        state[_RAMP_SHARE] = 4096
+        for index, root in enumerate(flow.roots(board.CRITICAL_RATIO)):
+            state[_ROOTS + index] = root
+        rows = self.rows
+        for at in range(0, self.count * _ROW_WORDS, _ROW_WORDS):
+            rows[at + _SENSOR_ZERO] = board.SENSOR_ZERO
+            rows[at + _OPENS_US] = board.VALVE_OPENS_US
+            rows[at + _CLOSES_US] = board.VALVE_CLOSES_US
+            rows[at + _FLOW_GAIN] = flow.flow_gain(board)
+            rows[at + _TARGET] = rows[at + _RAMP_START] = board.HEIGHT_REST_UM
+            rows[at + _HEIGHT] = rows[at + _SETPOINT] = board.HEIGHT_REST_UM << 4
+            rows[at + _DECIMATION_LEFT] = -1
+
     def use_tables(self):
         """Take up the tables in use, after a commit. The air stays; what height it means is found anew."""
-        row = self._rows
-        stride = control.KNOT * curve.KNOTS_MAX
+        rows = self.rows
+        stride = _KNOT_WORDS * curve.KNOTS_MAX
         for i in range(self.count):
-            at = i * control.ROW
+            at = i * _ROW_WORDS
             first = i * stride
-            size = curve.build(
-                self._curves, self._tables.knots, first, i * KNOTS_MAX, self._tables.sizes[i], self._dead
+            knots = curve.build(
+                self.curves, self._tables.knots, first, i * KNOTS_MAX, self._tables.sizes[i], self._dead_volume
             )
-            row[at + control.FIRST] = 4 * first
-            row[at + control.LAST] = 4 * (first + control.KNOT * (size - 2))
-            row[at + control.LOWEST], row[at + control.HIGHEST] = self._tables.pressures(i)
-            row[at + control.HEIGHT + control.SEGMENT] = row[at + control.SETPOINT + control.SEGMENT] = 4 * first
-            row[at + control.CALM] = row[at + control.COAST] = 0
-            row[at + control.RAMPING] = 1  # the setpoint's air is to be found again
+            rows[at + _FIRST_SEGMENT] = 4 * first
+            rows[at + _LAST_SEGMENT] = 4 * (first + _KNOT_WORDS * (knots - 2))
+            rows[at + _LOWEST_PRESSURE], rows[at + _HIGHEST_PRESSURE] = self._tables.pressures(i)
+            rows[at + _HEIGHT_SEGMENT] = rows[at + _SETPOINT_SEGMENT] = 4 * first
+            rows[at + _QUIESCENT] = rows[at + _HOLD_OUTPUT] = 0
+            rows[at + _RAMPING] = 1  # the setpoint's air is to be found again
 
-    def show(self, values, first, ticks):
-        """Ramp every bubble from where it is to the height (µm) in `values[first:]` within `ticks` ticks."""
-        control.aim(self._rows, values, first, self.count)
+    def set_targets(self, heights, at, ticks):
+        """Ramp every bubble from where it is to the height (µm) in `heights[at:]` within `ticks` ticks."""
+        trajectory.set_targets(self.rows, heights, at, self.count)
         self._ramp(ticks)
 
-    def begin(self, words, at, from_height):
+    def begin_step(self, words, at, from_height):
         """Begin a step of a sequence, whose targets (µm) are `words[at:]`; `advance` moves it on."""
-        control.aim_on(self._rows, words, at, self.count, from_height, self._board[control.REST_UM])
-        self._ramp(_ONE)
+        trajectory.set_next_targets(self.rows, words, at, self.count, from_height, self.state[_REST_UM])
+        self._ramp(_WHOLE_WAY)
 
     def advance(self, share):
         """Let the setpoints be `share`/32768 of their way at the end of this period. `step` adds the last one."""
-        self._board[control.RAMP_DONE] = share - 1
+        self.state[_RAMP_DONE] = share - 1
 
     def unsettled(self, tolerance):
         """The bubbles, as bits, that are further than `tolerance` µm from their targets."""
-        return control.unsettled(self._rows, self.count, tolerance, self._board[control.REST_UM])
+        return trajectory.unsettled(self.rows, self.count, tolerance, self.state[_REST_UM])
+
+    def hold_position(self):
+        """Where the bubbles are is where they are wanted."""
+        trajectory.hold_position(self.rows, self.count)
+        self._ramp(1)
+
+    def retract(self):
+        """No bubble is wanted higher than it is without pressure."""
+        trajectory.retract(self.rows, self.state[_REST_UM], self.count)
+        self._ramp(1)
 
     def _ramp(self, ticks):
-        self._board[control.RAMP_DONE] = 0
-        self._board[control.RAMP_TICKS] = ticks
+        self.state[_RAMP_DONE] = 0
+        self.state[_RAMP_TICKS] = ticks
 
-    def hold(self):
-        """Where the bubbles are is where they are wanted."""
-        control.hold(self._rows, self.count)
-        self._ramp(1)
+    def clear_faults(self, bubble):
+        """Forget the faults of one bubble; what still is wrong faults again.
 
-    def rest(self):
-        """No bubble is wanted higher than it is without pressure."""
-        control.rest(self._rows, self._board[control.REST_UM], self.count)
-        self._ramp(1)
-
-    def clear_faults(self):
-        """Forget all faults; what still is wrong faults again.
-
-        What leads to a fault goes on counting: a host that clears all the time does not disarm the guard.
+        What leads to a fault goes on counting: a host that clears all the time does not disarm the limits.
         """
-        control.forget(self._rows, self.count)
+        self.rows[bubble * _ROW_WORDS + _FAULTS] = 0
 
-    def forget(self, bubble):
-        """The same for one bubble."""
-        self._rows[bubble * control.ROW + control.FAULTS] = 0
+    def trim(self, bubble, number):
+        """One of the trim values of a bubble, see `trim`."""
+        return self.rows[bubble * _ROW_WORDS + number]
 
-    def figure(self, bubble, number):
-        """One of the figures of a bubble, see `figures`."""
-        return self._rows[bubble * control.ROW + number]
-
-    def set_figure(self, bubble, number, value):
-        """Take up one of the figures of a bubble."""
-        self._rows[bubble * control.ROW + number] = value
+    def set_trim(self, bubble, number, value):
+        """Take up one of the trim values of a bubble."""
+        self.rows[bubble * _ROW_WORDS + number] = value
 
     def pressure_pa(self, bubble):
         """Gauge pressure of one bubble."""
-        return self._rows[bubble * control.ROW + control.PRESSURE]
+        return self.rows[bubble * _ROW_WORDS + _PRESSURE]
 
     def faults(self, bubble):
         """Fault bits of one bubble."""
-        return self._rows[bubble * control.ROW + control.FAULTS]
+        return self.rows[bubble * _ROW_WORDS + _FAULTS]
 
-    def report(self, values, at):
+    def pack_state(self, values, at):
         """Put the repeated fields of STATE at `values[at:]`."""
-        control.gather(self._rows, values, at, self.count)
+        _pack_state(self.rows, values, at, self.count)
 
-    def pick(self, values, plan, at, columns):
-        """Put chosen words of every bubble's row at `values[at:]`, see `control.pick`; returns how many."""
-        control.pick(self._rows, values, plan, at, columns, self.count)
+    def pack_fields(self, values, plan, at, columns):
+        """Put chosen words of every bubble's row at `values[at:]`; returns how many.
+
+        `plan` names `columns` words of a row, and from its ninth place on by how many bits each is shifted right.
+        """
+        _pack_fields(self.rows, values, plan, at, columns, self.count)
         return columns * self.count

@@ -1,20 +1,11 @@
 # mypy: disable-error-code="valid-type,index,operator,arg-type"
-"""What a bubble's table means in air, and what pressures mean in flow: made once, so that the tick need not divide.
+"""What a bubble's table means in air: worked out once, so that the tick need not divide.
 
-A *curve* is a table's knots with more said at each, `control` names the places: height, air, pressure, and for the
+A *curve* is a table's knots with more said at each, `state_layout` names the places: height, air, pressure, and for the
 segment that begins there air per height and its reciprocal. Air is linear in height between two
 knots; a segment longer than 1 mm is divided, so that this costs less than 35 µm. Air always rises, by at least
 1 µJ/µm, whatever the table.
-
-*Roots* are what a restrictor's flow is proportional to (ISO 6358, below the critical ratio b):
-
-    √((p₁ − p₂)(p₂ + (1 − 2b) p₁))
-
-first for filling, over (p₁ − p₂)/p₁ from 0 to 1/2, in p₁, *2^14; then for venting, p₂ being the atmosphere, over
-p₁ − p₂ in steps of 1024 Pa, in 8 Pa.
 """
-
-from array import array
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
 
@@ -24,15 +15,15 @@ _LONGEST = const(1024)  # µm
 _ATMOSPHERE = const(101325)
 _RISE_MIN = const(1)  # µJ/µm
 _SLOPE_MAX = const(1 << 20)  # *256: steeper, and a deadband's air is beyond 32 bits
-_STEPS = 64
 
-# A knot, as in `control`.
-_H = const(0)
-_A = const(1)
-_P = const(2)
-_S = const(3)
-_R = const(4)
-_KNOT = const(5)
+# [constants] bubble_firmware.control.state_layout: KNOT_HEIGHT KNOT_AIR KNOT_PRESSURE KNOT_SLOPE KNOT_RECIPROCAL KNOT_WORDS
+_KNOT_HEIGHT = const(0)
+_KNOT_AIR = const(1)
+_KNOT_PRESSURE = const(2)
+_KNOT_SLOPE = const(3)
+_KNOT_RECIPROCAL = const(4)
+_KNOT_WORDS = const(5)
+# [end of constants]
 
 
 @micropython.viper
@@ -61,44 +52,21 @@ def build(curve: ptr32, knot: ptr16, at: int, first: int, size: int, dead: int) 
             volume = ((square * h >> 12) * 2303 >> 12) + dead
             content = (p + _ATMOSPHERE >> 4) * volume // 4000
             if made:
-                before = at - _KNOT
-                run = h - (curve[before + _H] >> 4)
+                before = at - _KNOT_WORDS
+                run = h - (curve[before + _KNOT_HEIGHT] >> 4)
                 if content < air + run * _RISE_MIN:
                     content = air + run * _RISE_MIN
                 slope = (content - air << 8) // run
                 if slope > _SLOPE_MAX:
                     slope = _SLOPE_MAX
-                curve[before + _S] = slope
-                curve[before + _R] = (1 << 28) // slope
-            curve[at + _H] = h << 4
-            curve[at + _A] = content
-            curve[at + _P] = p
+                curve[before + _KNOT_SLOPE] = slope
+                curve[before + _KNOT_RECIPROCAL] = (1 << 28) // slope
+            curve[at + _KNOT_HEIGHT] = h << 4
+            curve[at + _KNOT_AIR] = content
+            curve[at + _KNOT_PRESSURE] = p
             air = content
-            at += _KNOT
+            at += _KNOT_WORDS
             made += 1
             piece += 1
         i += 2
     return made
-
-
-def _root(square):
-    """The whole root of a number, rounded down (Newton)."""
-    root = square
-    better = (square + 1) >> 1
-    while better < root:
-        root = better
-        better = (root + square // root) >> 1
-    return root
-
-
-def roots(critical):
-    """The tables of roots for the critical ratio `critical`/256."""
-    table = array("i", bytearray(4 * 2 * (_STEPS + 1)))
-    choke = 256 - critical  # from this share of pressure on, *256, flow does not grow
-    for step in range(_STEPS + 1):
-        x = min(2 * step, choke)  # *256
-        table[step] = _root(x * (2 * choke - x) << 12)
-        d = 1024 * step
-        p1 = d + _ATMOSPHERE
-        table[_STEPS + 1 + step] = _root(d * (p1 * (256 - 2 * critical) // 256 + _ATMOSPHERE)) >> 3
-    return table

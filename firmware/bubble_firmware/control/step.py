@@ -22,542 +22,420 @@ decided how things are written here: two pointers first among the arguments, sma
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 
-# One row: where each number of a bubble stands. The first four are its figures, in the order of `figures`. Offsets
-# below 32 are cheap to reach.
-ZERO = const(0)  # sensor counts at no pressure
-OPENS_US = const(1)  # valve dead times
-CLOSES_US = const(2)
-FLOW_GAIN = const(3)  # root of pressures (8 Pa) to flow (µJ/ms), /65536
-PRESSURE = const(4)  # measured, Pa gauge
-ALERT = const(5)  # whether the last reading was one that may become a fault
-CALM = const(6)  # whether nothing is under way
-WAIT = const(7)  # readings yet to be summed before the mean is taken; -1: there is no sum
-SUM = const(8)  # of pressures, Pa
-BUSY = const(9)  # from the start of the period until the line is quiet, µs
-AIR = const(10)  # air at the start of this period, µJ
-DOSE = const(11)  # air that the period now playing brings, µJ
-NEXT = const(12)  # air that the period after it will bring, µJ
-TRUST = const(13)  # how many readings the estimate averages; 0: none yet
-FLOW = const(14)  # flow at the last dose, µJ/ms, *16, filling or venting
-INTEGRAL = const(15)  # of the error, µJ ticks
-ERROR = const(16)  # last tick's, µJ
-AIM = const(17)  # air of last tick's setpoint, µJ
-FILL_US = const(18)  # energised in the period now playing
-VENT_US = const(19)
-FILL_RUN_US = const(20)  # how long the fill valve has been open at a stretch
-FAULTS = const(21)
-STATUS = const(22)
-TARGET = const(23)  # asked, µm
-# Two heights, the estimate and the setpoint. Each is followed by what its curve says of it.
-HEIGHT = const(24)  # in 1/16 µm, so that averages do not stall on whole ones
-SETPOINT = const(28)  # in 1/16 µm
-SEGMENT = const(1)  # where its segment of the curve begins, bytes
-SLOPE = const(2)  # air per height in that segment, µJ/µm, *256
-MODEL = const(3)  # of the estimate: the pressure that belonged to it when it was last measured, Pa
-CONTENT = const(3)  # of the setpoint: its air, µJ
-START = const(32)  # where the ramp to the target began, µm
-RAMPING = const(33)  # whether the setpoint is not at its target yet
-COAST = const(34)  # whether the next tick goes on as this one
-FIRST = const(35)  # first and last segment of its curve, bytes
-LAST = const(36)
-LOWEST = const(37)  # pressures of its curve, Pa
-HIGHEST = const(38)
-OVER = const(39)  # ticks in a row above the pressure limit
-LOST = const(40)  # ticks in a row with the sensor at an end of its range
-ROW = const(41)
+# [constants] bubble_firmware.control.state_layout: used
+# [constants] bubble_protocol.schema.statuses: used
+# [constants] bubble_protocol.schema.faults: used
+_SENSOR_ZERO = const(0)
+_OPENS_US = const(1)
+_CLOSES_US = const(2)
+_FLOW_GAIN = const(3)
+_PRESSURE = const(4)
+_SUSPECT = const(5)
+_QUIESCENT = const(6)
+_DECIMATION_LEFT = const(7)
+_DECIMATION_SUM = const(8)
+_SETTLING_US = const(9)
+_AIR = const(10)
+_AIR_IN_FLIGHT = const(11)
+_AIR_QUEUED = const(12)
+_SAMPLES = const(13)
+_FLOW = const(14)
+_INTEGRAL = const(15)
+_ERROR = const(16)
+_PREVIOUS_SETPOINT_AIR = const(17)
+_FILL_US = const(18)
+_VENT_US = const(19)
+_FILL_RUN_US = const(20)
+_FAULTS = const(21)
+_STATUS = const(22)
+_TARGET = const(23)
+_HEIGHT = const(24)
+_HEIGHT_SEGMENT = const(25)
+_HEIGHT_SLOPE = const(26)
+_MODEL_PRESSURE = const(27)
+_SETPOINT = const(28)
+_SETPOINT_SEGMENT = const(29)
+_SETPOINT_SLOPE = const(30)
+_SETPOINT_AIR = const(31)
+_RAMP_START = const(32)
+_RAMPING = const(33)
+_HOLD_OUTPUT = const(34)
+_FIRST_SEGMENT = const(35)
+_LAST_SEGMENT = const(36)
+_LOWEST_PRESSURE = const(37)
+_HIGHEST_PRESSURE = const(38)
+_OVERPRESSURE_TICKS = const(39)
+_LOST_TICKS = const(40)
+_ROW_WORDS = const(41)
+_KNOT_HEIGHT = const(0)
+_KNOT_AIR = const(1)
+_KNOT_PRESSURE = const(2)
+_KNOT_SLOPE = const(3)
+_KNOT_RECIPROCAL = const(4)
+_KNOT_WORDS = const(5)
+_BUBBLE_COUNT = const(0)
+_TICK_US = const(1)
+_PA_PER_COUNT = const(2)
+_COUNT_LOW = const(3)
+_COUNT_HIGH = const(4)
+_PRESSURE_MAX = const(5)
+_FILL_MAX_US = const(6)
+_PULSE_MIN_US = const(7)
+_QUIET_US = const(8)
+_TUBE_PA = const(9)
+_GAIN_P = const(10)
+_GAIN_I = const(11)
+_GAIN_D = const(12)
+_DEADBAND_UM = const(13)
+_SETTLED_UM = const(14)
+_REST_UM = const(15)
+_SUPPLY_PA = const(16)
+_CONTROL_MODE = const(17)
+_RAMP_DONE = const(18)
+_RAMP_TICKS = const(19)
+_RAMP_SHARE = const(20)
+_ROOT_SCALE = const(21)
+_ROOT_RECIPROCAL = const(22)
+_ROOTS = const(23)
+_ROOT_STEPS = const(64)
+_ROWS = const(153)
+_VENT = const(0)
+_FOLLOW = const(1)
+_RESTING = const(0)
+_MOVING = const(1)
+_SETTLED = const(2)
+_STOPPED = const(3)
+_FAULT = const(4)
+_OVERPRESSURE = const(1)
+_SENSOR_LOST = const(2)
+_VALVE_TIME = const(4)
+# [end of constants]
 
-# A knot of a curve, see `curve`.
-H = const(0)  # height, 1/16 µm
-A = const(1)  # air, µJ
-P = const(2)  # pressure, Pa
-S = const(3)  # air per height from here on, µJ/µm, *256
-R = const(4)  # its reciprocal, 2^28/S
-KNOT = const(5)
-
-# The board's numbers.
-N = const(0)
-TICK_US = const(1)
-PA_PER_COUNT = const(2)
-COUNT_LOW = const(3)
-COUNT_HIGH = const(4)
-PRESSURE_MAX = const(5)
-FILL_MAX_US = const(6)
-PULSE_MIN_US = const(7)
-QUIET_US = const(8)
-TUBE = const(9)  # pressure lost along the tube, Pa per µJ/ms
-GAIN_P = const(10)  # gains *256
-GAIN_I = const(11)
-GAIN_D = const(12)
-DEADBAND_UM = const(13)
-SETTLED_UM = const(14)
-REST_UM = const(15)
-SUPPLY = const(16)  # measured, Pa gauge
-MODE = const(17)
-RAMP_DONE = const(18)  # ticks
-RAMP_TICKS = const(19)
-RAMP_SHARE = const(20)  # how much of it is done, *4096
-ROOT_SCALE = const(21)  # supply's absolute pressure, 8 Pa
-ROOT_SHARE = const(22)  # its reciprocal, (2^30 - 1)/Pa
-BOARD = const(23)
-
-# The state: the board's numbers, then the tables of roots, the rows, the curves.
-ROOTS = const(23)
-STEPS = const(64)  # in each of the two tables, see `curve`
-ROWS = const(153)
-
-ATMOSPHERE = const(101325)
-AIR_MAX = const(400000)  # more than any bubble of 16 mm holds: keeps every product below within 32 bits
-TRUST_MAX = const(64)
-TRUST_DOSED = const(16)  # left after a short dose, which is metered well
-SURPRISE_UM = const(500)  # further off than metering ever is,
-SURPRISE_PA = const(500)  # by more than noise: believe the sensor afresh
-INTEGRAL_MAX = const(1 << 17)
-READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noise
-ABSENT = const(0xFFFF)  # a count that says: no chip has answered. That is no noise
-SIZE_MAX = const(50000)  # µJ, more than any period brings
-SUMMED = const(3)  # readings of a calm bubble that are summed; with the one after them they make a mean of four
-ROOT_END = const(8191)  # the last place in a table of roots, *128
-
-# From the schema; a test compares them.
-VENTED = const(0)
-ACTIVE = const(1)
-RESTING = const(0)
-MOVING = const(1)
-SETTLED = const(2)
-STOPPED = const(3)
-FAULT = const(4)
-OVERPRESSURE = const(1)
-SENSOR_LOST = const(2)
-VALVE_TIME = const(4)
-LEAVE = const(0xFFFF)
-
-
-def flow_gain(board):
-    """FLOW_GAIN of the board's restrictors."""
-    # C (1e-6 dm³/(s bar)) 1e-14 SI, times 1e5 Pa (ANR) 8 Pa/(1 - b), W to µJ/ms, *65536
-    return board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO))
+_ATMOSPHERE = const(101325)
+_AIR_MAX = const(400000)  # more than any bubble of 16 mm holds: keeps every product below within 32 bits
+_SAMPLES_MAX = const(64)
+_SAMPLES_DOSED = const(16)  # left after a short dose, which is metered well
+_INNOVATION_UM = const(500)  # further off than metering ever is,
+_INNOVATION_PA = const(500)  # by more than noise: believe the sensor afresh
+_INTEGRAL_MAX = const(1 << 17)
+_READINGS_MIN = const(2)  # readings in a row that make a fault: one alone is noise
+_ABSENT = const(0xFFFF)  # a count that says: no chip has answered. That is no noise
+_DOSE_MAX = const(50000)  # µJ, more than any period brings
+_DECIMATION = const(3)  # readings of a calm bubble that are summed; with the one after them they make a mean of four
+_ROOT_END = const(8191)  # the last place in a table of roots, *128
 
 
 @micropython.viper
-def step(s: ptr32, k: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int):
+def step(row: ptr32, board: ptr32, count: ptr16, pulse: ptr16, supply: int, mode: int):
     """One tick of all bubbles: counts of their sensors in, `pulses` out, fill and vent µs of each in the next period."""
-    n = k[N]
-    curves = ptr32(uint(k) + 4 * (ROWS + ROW * n))
-    tick = k[TICK_US]
-    same = 1 if mode == k[MODE] else 0
-    k[MODE] = mode
-    k[SUPPLY] = supply
-    k[ROOT_SCALE] = supply + ATMOSPHERE >> 3
-    k[ROOT_SHARE] = 0x3FFFFFFF // (supply + ATMOSPHERE)
-    if k[RAMP_DONE] != k[RAMP_TICKS]:
-        k[RAMP_DONE] = k[RAMP_DONE] + 1
-        k[RAMP_SHARE] = (k[RAMP_DONE] << 12) // k[RAMP_TICKS]
+    n = board[_BUBBLE_COUNT]
+    curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
+    tick = board[_TICK_US]
+    same = 1 if mode == board[_CONTROL_MODE] else 0
+    board[_CONTROL_MODE] = mode
+    board[_SUPPLY_PA] = supply
+    board[_ROOT_SCALE] = supply + _ATMOSPHERE >> 3
+    board[_ROOT_RECIPROCAL] = 0x3FFFFFFF // (supply + _ATMOSPHERE)
+    if board[_RAMP_DONE] != board[_RAMP_TICKS]:
+        board[_RAMP_DONE] = board[_RAMP_DONE] + 1
+        board[_RAMP_SHARE] = (board[_RAMP_DONE] << 12) // board[_RAMP_TICKS]
     i = 0
     while i < n:
         c = count[i]
-        p = (c - s[ZERO]) * k[PA_PER_COUNT]
-        if (c - k[COUNT_LOW] - 1 | k[COUNT_HIGH] - 1 - c | k[PRESSURE_MAX] - p) >> 31 | s[ALERT]:
+        p = (c - row[_SENSOR_ZERO]) * board[_PA_PER_COUNT]
+        if (c - board[_COUNT_LOW] - 1 | board[_COUNT_HIGH] - 1 - c | board[_PRESSURE_MAX] - p) >> 31 | row[_SUSPECT]:
             # Guard: the sensor at an end of its range, or too much pressure, now or in the tick before.
-            s[ALERT] = 0
-            s[CALM] = 0
-            s[COAST] = 0
-            s[WAIT] = -1
-            if c <= k[COUNT_LOW] or c >= k[COUNT_HIGH]:
-                s[ALERT] = 1
-                s[LOST] = s[LOST] + 1 if c < ABSENT else READINGS_MIN
-                p = s[PRESSURE]
+            row[_SUSPECT] = 0
+            row[_QUIESCENT] = 0
+            row[_HOLD_OUTPUT] = 0
+            row[_DECIMATION_LEFT] = -1
+            if c <= board[_COUNT_LOW] or c >= board[_COUNT_HIGH]:
+                row[_SUSPECT] = 1
+                row[_LOST_TICKS] = row[_LOST_TICKS] + 1 if c < _ABSENT else _READINGS_MIN
+                p = row[_PRESSURE]
             else:
-                s[LOST] = 0
-            if p > k[PRESSURE_MAX]:
-                s[ALERT] = 1
-                s[OVER] = s[OVER] + 1
+                row[_LOST_TICKS] = 0
+            if p > board[_PRESSURE_MAX]:
+                row[_SUSPECT] = 1
+                row[_OVERPRESSURE_TICKS] = row[_OVERPRESSURE_TICKS] + 1
             else:
-                s[OVER] = 0
-            if s[OVER] >= READINGS_MIN:
-                s[FAULTS] = s[FAULTS] | OVERPRESSURE
-            if s[LOST] >= READINGS_MIN:
-                s[FAULTS] = s[FAULTS] | SENSOR_LOST
-        s[PRESSURE] = p
+                row[_OVERPRESSURE_TICKS] = 0
+            if row[_OVERPRESSURE_TICKS] >= _READINGS_MIN:
+                row[_FAULTS] = row[_FAULTS] | _OVERPRESSURE
+            if row[_LOST_TICKS] >= _READINGS_MIN:
+                row[_FAULTS] = row[_FAULTS] | _SENSOR_LOST
+        row[_PRESSURE] = p
 
         work = 1
-        if s[CALM] & same:
-            if s[BUSY] > 0:
-                s[BUSY] = s[BUSY] - tick
+        if row[_QUIESCENT] & same:
+            if row[_SETTLING_US] > 0:
+                row[_SETTLING_US] = row[_SETTLING_US] - tick
                 work = 0
-            elif s[WAIT] > 0:
-                s[WAIT] = s[WAIT] - 1
-                s[SUM] = s[SUM] + p
+            elif row[_DECIMATION_LEFT] > 0:
+                row[_DECIMATION_LEFT] = row[_DECIMATION_LEFT] - 1
+                row[_DECIMATION_SUM] = row[_DECIMATION_SUM] + p
                 work = 0
-        elif s[COAST] & same:
-            s[COAST] = 0
-            s[AIR] = s[AIR] + s[DOSE]
-            s[DOSE] = s[NEXT]
-            s[FILL_RUN_US] = s[FILL_RUN_US] + s[FILL_US]
+        elif row[_HOLD_OUTPUT] & same:
+            row[_HOLD_OUTPUT] = 0
+            row[_AIR] = row[_AIR] + row[_AIR_IN_FLIGHT]
+            row[_AIR_IN_FLIGHT] = row[_AIR_QUEUED]
+            row[_FILL_RUN_US] = row[_FILL_RUN_US] + row[_FILL_US]
             work = 0
         if work:
-            air = s[AIR] + s[DOSE]
-            seg = s[HEIGHT + SEGMENT]
-            q = ptr32(uint(curves) + seg)
-            if s[BUSY] <= 0 and s[ALERT] == 0:
+            air = row[_AIR] + row[_AIR_IN_FLIGHT]
+            seg = row[_HEIGHT_SEGMENT]
+            knot = ptr32(uint(curves) + seg)
+            if row[_SETTLING_US] <= 0 and row[_SUSPECT] == 0:
                 # The air that this pressure means: in the segment that contains it and is nearest to the
                 # estimate's, because a bubble stays on the branch where it was.
                 mean = p
                 weight = 1
-                if s[WAIT] == 0:
-                    mean = s[SUM] + p >> 2
+                if row[_DECIMATION_LEFT] == 0:
+                    mean = row[_DECIMATION_SUM] + p >> 2
                     weight = 4
-                s[WAIT] = -1
-                if (mean - s[LOWEST] | s[HIGHEST] - mean) >> 31:
-                    if mean < s[LOWEST]:
-                        q = ptr32(uint(curves) + s[FIRST])
-                        off = q[A] - air
+                row[_DECIMATION_LEFT] = -1
+                if (mean - row[_LOWEST_PRESSURE] | row[_HIGHEST_PRESSURE] - mean) >> 31:
+                    if mean < row[_LOWEST_PRESSURE]:
+                        knot = ptr32(uint(curves) + row[_FIRST_SEGMENT])
+                        off = knot[_KNOT_AIR] - air
                     else:
-                        q = ptr32(uint(curves) + s[LAST])
-                        off = q[KNOT + A] - air
+                        knot = ptr32(uint(curves) + row[_LAST_SEGMENT])
+                        off = knot[_KNOT_WORDS + _KNOT_AIR] - air
                 else:
                     low = seg
                     high = seg
                     turn = 0
-                    while (mean - q[P]) * (q[KNOT + P] - mean) >> 31:
+                    while (mean - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - mean) >> 31:
                         if turn:
                             turn = 0
-                            if low != s[FIRST]:
-                                low -= 4 * KNOT
-                            q = ptr32(uint(curves) + low)
+                            if low != row[_FIRST_SEGMENT]:
+                                low -= 4 * _KNOT_WORDS
+                            knot = ptr32(uint(curves) + low)
                         else:
                             turn = 1
-                            if high != s[LAST]:
-                                high += 4 * KNOT
-                            q = ptr32(uint(curves) + high)
-                    off = q[A] - air
-                    rise = q[KNOT + P] - q[P]
+                            if high != row[_LAST_SEGMENT]:
+                                high += 4 * _KNOT_WORDS
+                            knot = ptr32(uint(curves) + high)
+                    off = knot[_KNOT_AIR] - air
+                    rise = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
                     if rise:
-                        off += ((mean - q[P] << 12) // rise) * (q[KNOT + A] - q[A]) >> 12
-                if s[STATUS] & 3:
-                    trust = s[TRUST] + weight
-                    if trust > TRUST_MAX:
-                        trust = TRUST_MAX
-                    far = s[HEIGHT + SLOPE] * SURPRISE_UM >> 8
-                    q = ptr32(uint(curves) + seg)
-                    rise = air - q[A]  # the pressure that the estimate means, within its segment of the tick before
+                        off += ((mean - knot[_KNOT_PRESSURE] << 12) // rise) * (
+                            knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]
+                        ) >> 12
+                if row[_STATUS] & 3:
+                    trust = row[_SAMPLES] + weight
+                    if trust > _SAMPLES_MAX:
+                        trust = _SAMPLES_MAX
+                    far = row[_HEIGHT_SLOPE] * _INNOVATION_UM >> 8
+                    knot = ptr32(uint(curves) + seg)
+                    rise = (
+                        air - knot[_KNOT_AIR]
+                    )  # the pressure that the estimate means, within its segment of the tick before
                     if rise < 0:
                         rise = 0
-                    if rise > q[KNOT + A] - q[A]:
-                        rise = q[KNOT + A] - q[A]
-                    s[HEIGHT + MODEL] = q[P] + (((rise << 12) // (q[KNOT + A] - q[A])) * (q[KNOT + P] - q[P]) >> 12)
+                    if rise > knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]:
+                        rise = knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]
+                    row[_MODEL_PRESSURE] = knot[_KNOT_PRESSURE] + (
+                        ((rise << 12) // (knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]))
+                        * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE])
+                        >> 12
+                    )
                     if (far - off | far + off) >> 31 and (
-                        mean - s[HEIGHT + MODEL] > SURPRISE_PA or mean - s[HEIGHT + MODEL] < 0 - SURPRISE_PA
+                        mean - row[_MODEL_PRESSURE] > _INNOVATION_PA or mean - row[_MODEL_PRESSURE] < 0 - _INNOVATION_PA
                     ):
                         trust = 1
                         weight = 1
-                    s[TRUST] = trust
+                    row[_SAMPLES] = trust
                     air += (off * weight + (trust >> 1)) // trust  # rounded: a bias would add up over so many
                 else:  # the vent is open: nothing is counted, the sensor alone says what there is
-                    q = ptr32(uint(curves) + seg)
+                    knot = ptr32(uint(curves) + seg)
                     air += off
                 if air < 0:
                     air = 0
-            if air > AIR_MAX:
-                air = AIR_MAX
-            s[AIR] = air
+            if air > _AIR_MAX:
+                air = _AIR_MAX
+            row[_AIR] = air
 
             # The height that this air means.
-            off = air - q[A]
-            while (off | q[KNOT + A] - air) >> 31:  # it is in another segment
+            off = air - knot[_KNOT_AIR]
+            while (off | knot[_KNOT_WORDS + _KNOT_AIR] - air) >> 31:  # it is in another segment
                 if off < 0:
-                    if seg == s[FIRST]:
+                    if seg == row[_FIRST_SEGMENT]:
                         off = 0
                         break
-                    seg -= 4 * KNOT
+                    seg -= 4 * _KNOT_WORDS
                 else:
-                    if seg == s[LAST]:
-                        off = q[KNOT + A] - q[A]
+                    if seg == row[_LAST_SEGMENT]:
+                        off = knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]
                         break
-                    seg += 4 * KNOT
-                q = ptr32(uint(curves) + seg)
-                off = air - q[A]
-            height = q[H] + (off * q[R] >> 16)
-            s[HEIGHT] = height
-            s[HEIGHT + SEGMENT] = seg
-            s[HEIGHT + SLOPE] = q[S]
+                    seg += 4 * _KNOT_WORDS
+                knot = ptr32(uint(curves) + seg)
+                off = air - knot[_KNOT_AIR]
+            height = knot[_KNOT_HEIGHT] + (off * knot[_KNOT_RECIPROCAL] >> 16)
+            row[_HEIGHT] = height
+            row[_HEIGHT_SEGMENT] = seg
+            row[_HEIGHT_SLOPE] = knot[_KNOT_SLOPE]
 
             # The air of the setpoint.
-            if s[RAMPING]:
-                if k[RAMP_DONE] == k[RAMP_TICKS]:
-                    s[RAMPING] = 0
-                height = (s[START] << 4) + ((s[TARGET] - s[START]) * k[RAMP_SHARE] >> 8)
-                s[SETPOINT] = height
-                seg = s[SETPOINT + SEGMENT]
-                q = ptr32(uint(curves) + seg)
-                off = height - q[H]
-                while (off | q[KNOT + H] - height) >> 31:
+            if row[_RAMPING]:
+                if board[_RAMP_DONE] == board[_RAMP_TICKS]:
+                    row[_RAMPING] = 0
+                height = (row[_RAMP_START] << 4) + ((row[_TARGET] - row[_RAMP_START]) * board[_RAMP_SHARE] >> 8)
+                row[_SETPOINT] = height
+                seg = row[_SETPOINT_SEGMENT]
+                knot = ptr32(uint(curves) + seg)
+                off = height - knot[_KNOT_HEIGHT]
+                while (off | knot[_KNOT_WORDS + _KNOT_HEIGHT] - height) >> 31:
                     if off < 0:
-                        if seg == s[FIRST]:
+                        if seg == row[_FIRST_SEGMENT]:
                             off = 0
                             break
-                        seg -= 4 * KNOT
+                        seg -= 4 * _KNOT_WORDS
                     else:
-                        if seg == s[LAST]:
-                            off = q[KNOT + H] - q[H]
+                        if seg == row[_LAST_SEGMENT]:
+                            off = knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]
                             break
-                        seg += 4 * KNOT
-                    q = ptr32(uint(curves) + seg)
-                    off = height - q[H]
-                s[SETPOINT + SEGMENT] = seg
-                s[SETPOINT + SLOPE] = q[S]
-                s[SETPOINT + CONTENT] = q[A] + (off * q[S] >> 12)
+                        seg += 4 * _KNOT_WORDS
+                    knot = ptr32(uint(curves) + seg)
+                    off = height - knot[_KNOT_HEIGHT]
+                row[_SETPOINT_SEGMENT] = seg
+                row[_SETPOINT_SLOPE] = knot[_KNOT_SLOPE]
+                row[_SETPOINT_AIR] = knot[_KNOT_AIR] + (off * knot[_KNOT_SLOPE] >> 12)
 
-            filled = s[FILL_US]
-            vented = s[VENT_US]
+            filled = row[_FILL_US]
+            vented = row[_VENT_US]
             energised = filled + vented
-            dose = s[NEXT]
-            s[DOSE] = dose
+            dose = row[_AIR_QUEUED]
+            row[_AIR_IN_FLIGHT] = dose
             tail = 0
             if energised:
-                s[BUSY] = energised + s[CLOSES_US] + k[QUIET_US] - tick
-                s[FILL_RUN_US] = s[FILL_RUN_US] + filled if filled == tick else 0
-                if s[FILL_RUN_US] >= k[FILL_MAX_US]:
-                    s[FAULTS] = s[FAULTS] | VALVE_TIME
+                row[_SETTLING_US] = energised + row[_CLOSES_US] + board[_QUIET_US] - tick
+                row[_FILL_RUN_US] = row[_FILL_RUN_US] + filled if filled == tick else 0
+                if row[_FILL_RUN_US] >= board[_FILL_MAX_US]:
+                    row[_FAULTS] = row[_FAULTS] | _VALVE_TIME
                 if energised == tick:
                     # It closes its dead time into the next period: that air comes anyway. /16000 by multiplication.
-                    tail = (s[FLOW] * s[CLOSES_US] >> 12) * 16777 >> 16
+                    tail = (row[_FLOW] * row[_CLOSES_US] >> 12) * 16777 >> 16
                     if vented:
                         tail = 0 - tail
             else:
-                s[FILL_RUN_US] = 0
-                if s[BUSY] > 0:
-                    s[BUSY] = s[BUSY] - tick
+                row[_FILL_RUN_US] = 0
+                if row[_SETTLING_US] > 0:
+                    row[_SETTLING_US] = row[_SETTLING_US] - tick
 
             fill = 0
             vent = 0
-            aim = s[SETPOINT + CONTENT]
+            aim = row[_SETPOINT_AIR]
             rest = 0
-            if s[FAULTS]:
-                s[STATUS] = FAULT
+            if row[_FAULTS]:
+                row[_STATUS] = _FAULT
                 rest = 1
-            elif mode == VENTED or (mode == ACTIVE and s[SETPOINT] <= k[REST_UM] + k[DEADBAND_UM] << 4):
-                s[STATUS] = RESTING
+            elif mode == _VENT or (mode == _FOLLOW and row[_SETPOINT] <= board[_REST_UM] + board[_DEADBAND_UM] << 4):
+                row[_STATUS] = _RESTING
                 rest = 1
             if rest:
-                s[CALM] = 1 if vented == tick and s[RAMPING] == 0 else 0
-                s[NEXT] = 0
-                s[BUSY] = 0
-                s[AIM] = air
-                s[ERROR] = 0
-                s[INTEGRAL] = 0
-                s[TRUST] = 0
-                s[FLOW] = 0
+                row[_QUIESCENT] = 1 if vented == tick and row[_RAMPING] == 0 else 0
+                row[_AIR_QUEUED] = 0
+                row[_SETTLING_US] = 0
+                row[_PREVIOUS_SETPOINT_AIR] = air
+                row[_ERROR] = 0
+                row[_INTEGRAL] = 0
+                row[_SAMPLES] = 0
+                row[_FLOW] = 0
                 vent = tick
-            elif mode != ACTIVE:
-                s[STATUS] = STOPPED
-                s[CALM] = 0 if energised or dose else 1
-                s[NEXT] = tail
-                s[AIM] = air
-                s[ERROR] = 0
+            elif mode != _FOLLOW:
+                row[_STATUS] = _STOPPED
+                row[_QUIESCENT] = 0 if energised or dose else 1
+                row[_AIR_QUEUED] = tail
+                row[_PREVIOUS_SETPOINT_AIR] = air
+                row[_ERROR] = 0
             else:
-                off = s[TARGET] - (s[HEIGHT] >> 4)
-                s[STATUS] = MOVING
-                if s[RAMPING] == 0 and s[TRUST] > 1 and (k[SETTLED_UM] - off | k[SETTLED_UM] + off) >> 31 == 0:
-                    s[STATUS] = SETTLED
-                ahead = aim - s[AIM]  # what the setpoint's own motion asks for: feed-forward
-                error = s[AIM] - air - dose - tail
-                s[AIM] = aim
-                s[NEXT] = tail
-                s[CALM] = 0
-                band = s[SETPOINT + SLOPE] * k[DEADBAND_UM] >> 8
+                off = row[_TARGET] - (row[_HEIGHT] >> 4)
+                row[_STATUS] = _MOVING
+                if (
+                    row[_RAMPING] == 0
+                    and row[_SAMPLES] > 1
+                    and (board[_SETTLED_UM] - off | board[_SETTLED_UM] + off) >> 31 == 0
+                ):
+                    row[_STATUS] = _SETTLED
+                ahead = aim - row[_PREVIOUS_SETPOINT_AIR]  # what the setpoint's own motion asks for: feed-forward
+                error = row[_PREVIOUS_SETPOINT_AIR] - air - dose - tail
+                row[_PREVIOUS_SETPOINT_AIR] = aim
+                row[_AIR_QUEUED] = tail
+                row[_QUIESCENT] = 0
+                band = row[_SETPOINT_SLOPE] * board[_DEADBAND_UM] >> 8
                 if ahead | (band - error | band + error) >> 31 == 0:
-                    if (energised | dose | s[RAMPING]) == 0:
-                        s[CALM] = 1
-                elif s[TRUST]:
-                    integral = s[INTEGRAL] + error
-                    want = ahead + (error * k[GAIN_P] + integral * k[GAIN_I] + (error - s[ERROR]) * k[GAIN_D] >> 8)
+                    if (energised | dose | row[_RAMPING]) == 0:
+                        row[_QUIESCENT] = 1
+                elif row[_SAMPLES]:
+                    integral = row[_INTEGRAL] + error
+                    want = ahead + (
+                        error * board[_GAIN_P] + integral * board[_GAIN_I] + (error - row[_ERROR]) * board[_GAIN_D] >> 8
+                    )
 
                     # Flow of a restrictor below its critical ratio (ISO 6358), from the tables of its root.
-                    lost = k[TUBE] * s[FLOW] >> 4 if s[BUSY] <= 0 else 0
+                    lost = board[_TUBE_PA] * row[_FLOW] >> 4 if row[_SETTLING_US] <= 0 else 0
                     size = want
                     if want > 0:
                         opened = 1 if filled == tick else 0
-                        at = (k[SUPPLY] - p - lost) * k[ROOT_SHARE] >> 16
-                        scale = k[ROOT_SCALE]
+                        at = (board[_SUPPLY_PA] - p - lost) * board[_ROOT_RECIPROCAL] >> 16
+                        scale = board[_ROOT_SCALE]
                     else:
                         size = 0 - want
                         opened = 1 if vented == tick else 0
                         at = p - lost >> 3
                         scale = 1 << 14
                     if at >> 13:
-                        at = ROOT_END if at > 0 else 0
+                        at = _ROOT_END if at > 0 else 0
                     part = at & 127
                     at >>= 7
                     if want <= 0:
-                        at += STEPS + 1
-                    q = ptr32(uint(k) + 4 * at)
-                    root = scale * (q[ROOTS] + ((q[ROOTS + 1] - q[ROOTS]) * part >> 7)) >> 14
-                    flow = (root * s[FLOW_GAIN] >> 12) + 1
-                    s[FLOW] = flow
+                        at += _ROOT_STEPS + 1
+                    knot = ptr32(uint(board) + 4 * at)
+                    root = scale * (knot[_ROOTS] + ((knot[_ROOTS + 1] - knot[_ROOTS]) * part >> 7)) >> 14
+                    flow = (root * row[_FLOW_GAIN] >> 12) + 1
+                    row[_FLOW] = flow
 
                     # Air to time. A valve that is still open needs no opening and its closing is in the tail.
-                    if size > SIZE_MAX:
-                        size = SIZE_MAX
-                    delay = 0 if opened else s[OPENS_US] - s[CLOSES_US]
+                    if size > _DOSE_MAX:
+                        size = _DOSE_MAX
+                    delay = 0 if opened else row[_OPENS_US] - row[_CLOSES_US]
                     width = size * 16000 // flow + delay
-                    shortest = k[PULSE_MIN_US]
-                    if opened and width > 3 * tick and s[FILL_RUN_US] + 2 * tick < k[FILL_MAX_US]:
-                        s[COAST] = 1
+                    shortest = board[_PULSE_MIN_US]
+                    if opened and width > 3 * tick and row[_FILL_RUN_US] + 2 * tick < board[_FILL_MAX_US]:
+                        row[_HOLD_OUTPUT] = 1
                     if width > tick - shortest:  # too short a gap to close in
                         width = tick if width > tick - (shortest >> 1) else tick - shortest
                     elif opened == 0 and width < shortest:  # of open time, half of that or more is worth a pulse
                         width = shortest if 2 * (width - delay) >= shortest - delay else 0
                     if width < tick:
                         # Only while not saturated: the integral must not wind up.
-                        if integral > INTEGRAL_MAX:
-                            integral = INTEGRAL_MAX
-                        if integral < 0 - INTEGRAL_MAX:
-                            integral = 0 - INTEGRAL_MAX
-                        s[INTEGRAL] = integral
+                        if integral > _INTEGRAL_MAX:
+                            integral = _INTEGRAL_MAX
+                        if integral < 0 - _INTEGRAL_MAX:
+                            integral = 0 - _INTEGRAL_MAX
+                        row[_INTEGRAL] = integral
                     if width:
                         moved = width - delay
                         if width == tick:
-                            moved -= s[CLOSES_US]
-                            s[TRUST] = 1
-                        elif s[TRUST] > TRUST_DOSED:
-                            s[TRUST] = TRUST_DOSED
+                            moved -= row[_CLOSES_US]
+                            row[_SAMPLES] = 1
+                        elif row[_SAMPLES] > _SAMPLES_DOSED:
+                            row[_SAMPLES] = _SAMPLES_DOSED
                         moved = (flow * moved >> 12) * 16777 >> 16
                         if want > 0:
                             fill = width
-                            s[NEXT] = tail + moved
+                            row[_AIR_QUEUED] = tail + moved
                         else:
                             vent = width
-                            s[NEXT] = tail - moved
-                s[ERROR] = error
-            if s[CALM] and s[BUSY] <= 0:
-                s[WAIT] = SUMMED
-                s[SUM] = 0
-            s[FILL_US] = fill
-            s[VENT_US] = vent
-        pulse[2 * i] = s[FILL_US]
-        pulse[2 * i + 1] = s[VENT_US]
+                            row[_AIR_QUEUED] = tail - moved
+                row[_ERROR] = error
+            if row[_QUIESCENT] and row[_SETTLING_US] <= 0:
+                row[_DECIMATION_LEFT] = _DECIMATION
+                row[_DECIMATION_SUM] = 0
+            row[_FILL_US] = fill
+            row[_VENT_US] = vent
+        pulse[2 * i] = row[_FILL_US]
+        pulse[2 * i + 1] = row[_VENT_US]
         i += 1
-        s = ptr32(uint(s) + 4 * ROW)
-
-
-@micropython.viper
-def gather(s: ptr32, v: ptr32, at: int, n: int):
-    """Copy what STATE and TELEMETRY say of every bubble to `values[at:]`, in the schema's order."""
-    while n > 0:
-        v[at] = s[HEIGHT] >> 4
-        v[at + 1] = s[PRESSURE]
-        v[at + 2] = s[TARGET]
-        v[at + 3] = s[STATUS]
-        v[at + 4] = s[FAULTS]
-        at += 5
-        s = ptr32(uint(s) + 4 * ROW)
-        n -= 1
-
-
-@micropython.viper
-def pick(s: ptr32, v: ptr32, plan: ptr32, at: int, columns: int, n: int):
-    """Copy the words of every row that `plan` names, shifted right by what stands 8 words after each name."""
-    while n > 0:
-        i = 0
-        while i < columns:
-            v[at] = s[plan[i]] >> plan[i + 8]
-            at += 1
-            i += 1
-        s = ptr32(uint(s) + 4 * ROW)
-        n -= 1
-
-
-@micropython.viper
-def aim(s: ptr32, v: ptr32, at: int, n: int):
-    """Begin every bubble's way from where it is to the height (µm) in `values[at:]`."""
-    while n > 0:
-        s[START] = s[HEIGHT] >> 4
-        s[TARGET] = v[at]
-        s[CALM] = 0
-        s[COAST] = 0
-        s[RAMPING] = 1
-        s = ptr32(uint(s) + 4 * ROW)
-        at += 1
-        n -= 1
-
-
-@micropython.viper
-def aim_on(s: ptr32, w: ptr16, at: int, n: int, from_height: int, rest: int):
-    """Begin the way to the targets (µm) in `w[at:]`; a bubble whose target is LEAVE keeps the one that it has.
-
-    It begins where the setpoint is, so that a ramp follows another without a step, or at the estimated height.
-    """
-    while n > 0:
-        s[START] = (s[HEIGHT] if from_height else s[SETPOINT]) >> 4
-        target = w[at]
-        if target != LEAVE:
-            s[TARGET] = target if target > rest else rest  # lower would be the end of the ramp before its time
-        s[CALM] = 0
-        s[COAST] = 0
-        s[RAMPING] = 1
-        s = ptr32(uint(s) + 4 * ROW)
-        at += 1
-        n -= 1
-
-
-@micropython.viper
-def unsettled(s: ptr32, n: int, tolerance: int, rest: int) -> int:
-    """The bubbles, as bits, whose height is further than `tolerance` µm from the target, or not yet measured."""
-    bits = 0
-    bit = 1
-    while n > 0:
-        target = s[TARGET]
-        off = (target if target > rest else rest) - (s[HEIGHT] >> 4)
-        known = 1 if s[TRUST] > 1 or s[STATUS] == RESTING else 0
-        if off > tolerance or off < 0 - tolerance or known == 0 or s[FAULTS]:
-            bits |= bit
-        bit <<= 1
-        s = ptr32(uint(s) + 4 * ROW)
-        n -= 1
-    return bits
-
-
-@micropython.viper
-def hold(s: ptr32, n: int):
-    """Want every bubble where it is."""
-    while n > 0:
-        s[START] = s[HEIGHT] >> 4
-        s[TARGET] = s[START]
-        s[CALM] = 0
-        s[COAST] = 0
-        s[RAMPING] = 1
-        s = ptr32(uint(s) + 4 * ROW)
-        n -= 1
-
-
-@micropython.viper
-def rest(s: ptr32, height: int, n: int):
-    """Want every bubble at `height` µm, at once."""
-    while n > 0:
-        s[START] = height
-        s[TARGET] = height
-        s[CALM] = 0
-        s[COAST] = 0
-        s[RAMPING] = 1
-        s = ptr32(uint(s) + 4 * ROW)
-        n -= 1
-
-
-@micropython.viper
-def forget(s: ptr32, n: int):
-    """Forget all faults, but not what is about to become one."""
-    while n > 0:
-        s[FAULTS] = 0
-        s[CALM] = 0
-        s = ptr32(uint(s) + 4 * ROW)
-        n -= 1
-
-
-@micropython.viper
-def first_above(v: ptr32, at: int, end: int, limit: int) -> int:
-    """The index of the first of `values[at:end]` above `limit`, -1 where there is none."""
-    while at < end:
-        if v[at] > limit:
-            return at
-        at += 1
-    return -1
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)

@@ -7,30 +7,10 @@ from array import array
 
 from bubble_firmware.control.nominal import KNOTS as NOMINAL
 from bubble_protocol.crc import crc32_on
-from bubble_protocol.mpy_compat import micropython, ptr16
 
 KNOTS_MAX = 64
 KNOT_BYTES = 4
 HEIGHT_MAX_UM = 16000  # beyond, the air of a bubble no longer fits the arithmetic of `bubbles`
-
-
-@micropython.viper
-def pressure_at(knots, first: int, size: int, height: int) -> int:
-    """Pressure in Pa that holds `height` µm, by the `size` knots from number `first` on.
-
-    Between knots: p0 + (p1 - p0) * (height - h0) // (h1 - h0), rounded down. Outside: the nearest knot's.
-    """
-    knot = ptr16(knots)
-    at = 2 * first
-    last = at + 2 * (size - 1)
-    if height <= knot[at]:
-        return knot[at + 1]
-    if height >= knot[last]:
-        return knot[last + 1]
-    while height >= knot[at + 2]:
-        at += 2
-    p0 = knot[at + 1]
-    return p0 + (knot[at + 3] - p0) * (height - knot[at]) // (knot[at + 2] - knot[at])
 
 
 class Tables:
@@ -113,11 +93,6 @@ class Tables:
             start = bubble * KNOTS_MAX * KNOT_BYTES
             crc32_on(self._received, start, start + self._received_sizes[bubble] * KNOT_BYTES, self._crc)
         return self._crc[0]
-
-    def forget(self):
-        """Drop what has been received; what is received next starts from a copy of what is in use."""
-        self._received[:] = self.knots
-        self._received_sizes[:] = self.sizes
 
     def swap(self):
         """Use the received set; what is received next starts from a copy of it."""

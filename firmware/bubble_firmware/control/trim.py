@@ -1,12 +1,12 @@
 """Trim: what sets one bubble apart besides its table: its sensor's zero, its valves' dead times, its restrictor's flow.
 
-Four numbers a bubble, the first of its row in `control`. Without better knowledge they are the board's. What is taken up
+Four numbers a bubble, the first of its row, see `state_layout`. Without better knowledge they are the board's. What is taken up
 is within limits around the board's own: a zero that is off moves the pressure limit by as much.
 """
 
 from array import array
 
-from bubble_firmware.control import step
+from bubble_firmware.control.flow import flow_gain
 from bubble_protocol.mpy_compat import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class Trim:
         self._bubbles = bubbles
         off = _ZERO_PA // board.SENSOR_PA_PER_COUNT
         dead_us = board.TICK_US // 2
-        gain = step.flow_gain(board)
+        gain = flow_gain(board)
         self.nominal = array("i", (board.SENSOR_ZERO, board.VALVE_OPENS_US, board.VALVE_CLOSES_US, gain))
         self.low = array("i", (max(board.SENSOR_ZERO - off, board.COUNT_LOW + 1), 0, 0, gain // 4))
         self.high = array("i", (board.SENSOR_ZERO + off, dead_us, dead_us, min(4 * gain, 65535)))
@@ -40,14 +40,14 @@ class Trim:
     def use(self, values: "array[int]") -> None:
         """Take up the trim of all bubbles."""
         for at in range(COUNT * self._bubbles.count):
-            self._bubbles.set_figure(at // COUNT, at % COUNT, values[at])
+            self._bubbles.set_trim(at // COUNT, at % COUNT, values[at])
 
     def use_nominal(self) -> None:
         """Take up the board's."""
         for at in range(COUNT * self._bubbles.count):
-            self._bubbles.set_figure(at // COUNT, at % COUNT, self.nominal[at % COUNT])
+            self._bubbles.set_trim(at // COUNT, at % COUNT, self.nominal[at % COUNT])
 
     def read(self, values: "array[int]") -> None:
         """Put the trim of all bubbles in `values`."""
         for at in range(COUNT * self._bubbles.count):
-            values[at] = self._bubbles.figure(at // COUNT, at % COUNT)
+            values[at] = self._bubbles.trim(at // COUNT, at % COUNT)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
 LINK_IN = 256
+"""Bytes of the link that the firmware takes in one tick."""
 LINK_OUT = 1024
 LISTEN_ONLY = 0x8000
 RESET = 0xFF

@@ -1,6 +1,6 @@
 """Requests about the shape as a whole: SHOW, STATE, STOP, VENT."""
 
-from bubble_firmware.control.step import first_above
+from bubble_firmware.control.trajectory import first_above
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
@@ -74,7 +74,7 @@ class ShapeHandlers(Handlers):
         values = self._reply.values
         values[_STATE_TICKS] = self._state.clock.ticks
         values[_STATE_MODE] = self._state.safety.mode
-        self._bubbles.report(values, _STATE_HEIGHT_UM)
+        self._bubbles.pack_state(values, _STATE_HEIGHT_UM)
         self._reply.reply(self._bubbles.count)
 
     def _stop(self, count: int) -> None:

@@ -84,7 +84,7 @@ class SystemHandlers(Handlers):
         stats = self._stats
         server = self._server
         test = state.self_test
-        if not state.safety.drive:  # vented: counting takes longer than a tick
+        if not state.safety.control_mode:  # vented: counting takes longer than a tick
             self._hal.allow_overrun()
             self._heap_free = heap_free()
         values[_INFO_TICKS] = state.clock.ticks

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from bubble_firmware.control.trim import Trim
     from bubble_firmware.link.reply import Reply
-    from bubble_firmware.safety.state import Safety
+    from bubble_firmware.safety.state import SafetyState
 
 # [constants] bubble_protocol.schema.messages: TRIM_READ TRIM_WRITE
 # [constants] bubble_protocol.schema.errors: NO_ELEMENT OUT_OF_RANGE WRONG_COUNT
@@ -26,7 +26,7 @@ _WRONG_COUNT = const(4)
 class TrimHandlers(Handlers):
     """The trim of all bubbles."""
 
-    def __init__(self, reply: "Reply", board: "ModuleType", safety: "Safety", trim: "Trim"):
+    def __init__(self, reply: "Reply", board: "ModuleType", safety: "SafetyState", trim: "Trim"):
         self._reply = reply
         self._bubbles = board.BUBBLES
         self._safety = safety

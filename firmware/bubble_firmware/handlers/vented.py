@@ -4,7 +4,7 @@ from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
 if TYPE_CHECKING:
     from bubble_firmware.link.reply import Reply
-    from bubble_firmware.safety.state import Safety
+    from bubble_firmware.safety.state import SafetyState
 
 # [constants] bubble_protocol.schema.errors: NO_ELEMENT NOT_VENTED
 # [constants] bubble_protocol.schema.modes: IDLE
@@ -14,9 +14,9 @@ _IDLE = const(0)
 # [end of constants]
 
 
-def is_vented(reply: "Reply", safety: "Safety") -> bool:
+def is_vented(reply: "Reply", safety: "SafetyState") -> bool:
     """Whether all bubbles are vented; refuses the request where they are not."""
-    if not safety.drive:
+    if not safety.control_mode:
         return True
     reply.refuse(_NOT_VENTED, 0, _NO_ELEMENT, safety.mode, _IDLE, _IDLE)
     return False

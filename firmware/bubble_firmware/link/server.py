@@ -54,7 +54,7 @@ class Server:
 
     def __init__(self, board: "ModuleType", hal: "Hal", state: "BoardState", bubbles: "Bubbles"):
         self._hal = hal
-        self._safety = state.safety
+        self._deadman = state.deadman
         self.window = ReceiveWindow(hal.boot_id & 0xFFFFFFFF)
         self.decoder = Decoder(crc32_into, self.window.key)
         self.sender = Sender(hal, self.window)
@@ -161,7 +161,7 @@ class Server:
 
     def _handle(self, message_id: int, frame: bytearray, size: int) -> None:
         reply = self.reply
-        self._safety.heard()
+        self._deadman.host_activity()
         handler = self._handlers.get(message_id)
         if handler is None:
             reply.refuse(_UNKNOWN_MESSAGE, 0, _NO_ELEMENT, message_id, 0, 0)

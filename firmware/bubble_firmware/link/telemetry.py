@@ -2,7 +2,7 @@
 
 from array import array
 
-from bubble_firmware.control import step
+from bubble_firmware.control import state_layout as layout
 from bubble_protocol import codec, frame
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
@@ -32,14 +32,14 @@ _FIELDS_STRIDE = const(1)
 # [end of constants]
 
 _COLUMNS = (  # where each field stands in a bubble's row, and by how many bits it is shifted
-    (step.HEIGHT, 4),
-    (step.PRESSURE, 2),
-    (step.TARGET, 0),
-    (step.STATUS, 0),
-    (step.FAULTS, 0),
-    (step.SETPOINT, 4),
-    (step.FILL_US, 0),
-    (step.VENT_US, 0),
+    (layout.HEIGHT, 4),
+    (layout.PRESSURE, 2),
+    (layout.TARGET, 0),
+    (layout.STATUS, 0),
+    (layout.FAULTS, 0),
+    (layout.SETPOINT, 4),
+    (layout.FILL_US, 0),
+    (layout.VENT_US, 0),
 )
 _SHIFTS = const(8)  # where in the plan the shifts begin
 
@@ -105,7 +105,7 @@ class Telemetry:
         if not self._fields:
             values[_TELEMETRY_TICKS] = self._clock.ticks
             values[_TELEMETRY_MODE] = self._safety.mode
-            bubbles.report(values, _TELEMETRY_HEIGHT_UM)
+            bubbles.pack_state(values, _TELEMETRY_HEIGHT_UM)
             return self._sender.send(_TELEMETRY, self._number, bubbles.count)
         values[_FIELDS_TICKS] = self._clock.ticks
         values[_FIELDS_MODE] = self._safety.mode
@@ -113,5 +113,5 @@ class Telemetry:
         values[_FIELDS_SUPPLY_PA] = self._supply.pressure_pa
         values[_FIELDS_DROPPED] = self._dropped
         values[_FIELDS_FIELDS] = self._fields
-        count = bubbles.pick(values, self._plan, _FIELDS_VALUE, self._columns)
+        count = bubbles.pack_fields(values, self._plan, _FIELDS_VALUE, self._columns)
         return self._sender.send(_TELEMETRY_FIELDS, self._number, count)

@@ -109,7 +109,7 @@ FALL_PA = const(1000)  # by which it must fall otherwise
 OVERFILLED_PA = const(12000)  # 5.8 mm: more in a vented bubble, and the supply is shut down for all
 
 # What `check` says.
-NEW, MOVES, PRESSED, OVERFILLED = 1, 2, 4, 8
+NEW_FAULT, MOVING_BUBBLE, PRESSED_BUBBLE, OVERFILLED_BUBBLE = 1, 2, 4, 8
 _NEW = const(1)
 _MOVES = const(2)
 _PRESSED = const(4)
@@ -311,7 +311,7 @@ def _check(s: ptr32, g: ptr32, k: ptr32, w: ptr32) -> int:
 
 
 @micropython.viper
-def _spare(s: ptr32, pulse: ptr16, supply: int, n: int):
+def _block_backflow(s: ptr32, pulse: ptr16, supply: int, n: int):
     i = 0
     while i < n:
         if pulse[2 * i] and supply < s[PRESSURE]:
@@ -325,8 +325,8 @@ def _spare(s: ptr32, pulse: ptr16, supply: int, n: int):
         s = ptr32(uint(s) + 4 * ROW)
 
 
-class Guard:
-    """Watches `bubbles`. `check` returns what it has found as bits: NEW faults, MOVES, PRESSED, OVERFILLED."""
+class FaultMonitor:
+    """Watches `bubbles`. `check` returns what it has found, as bits: NEW_FAULT, MOVING_BUBBLE and so on."""
 
     def __init__(self, board, bubbles):
         n = board.BUBBLES
@@ -355,15 +355,15 @@ class Guard:
     def check(self):
         """Look at all bubbles, after `Bubbles.step`."""
         bubbles = self._bubbles
-        return _check(bubbles.rows, self._rows, bubbles.board, self._numbers)
+        return _check(bubbles.rows, self._rows, bubbles.state, self._numbers)
 
-    def spare(self, supply_pa):
+    def block_backflow(self, supply_pa):
         """After `Bubbles.step`: no fill valve opens to a supply below the bubble's pressure, which would empty it."""
         if supply_pa < self._enough_pa:
             bubbles = self._bubbles
-            _spare(bubbles.rows, bubbles.pulses, supply_pa, self._count)
+            _block_backflow(bubbles.rows, bubbles.pulses, supply_pa, self._count)
 
-    def unseen(self, bubble):
+    def take_new_faults(self, bubble):
         """The fault bits of a bubble that are new since the last time."""
         at = bubble * GUARD + SEEN
         faults = self._bubbles.faults(bubble)
@@ -371,10 +371,6 @@ class Guard:
         self._rows[at] = faults
         return new
 
-    def forget(self, bubble):
+    def acknowledge(self, bubble):
         """The faults of this bubble are acknowledged: those that still are there are new."""
         self._rows[bubble * GUARD + SEEN] = 0
-
-    def load_kpa_s(self, bubble):
-        """How much of its budget a bubble has used, kPa s."""
-        return self._rows[bubble * GUARD + LOAD] // (1000000000 // self._tick_us)

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from bubble_firmware.control.bubbles import Bubbles
     from bubble_firmware.control.supply import Supply
     from bubble_firmware.device_clock import DeviceClock
-    from bubble_firmware.safety.fault_monitor import Guard
+    from bubble_firmware.safety.fault_monitor import FaultMonitor
 
 # [constants] bubble_protocol.schema.faults: BOARD
 _BOARD = const(255)
@@ -22,7 +22,7 @@ class LatchedFaults:
     The log's value of a bubble's fault is the bubble's pressure, of a board's fault the reservoir's.
     """
 
-    def __init__(self, clock: "DeviceClock", supply: "Supply", bubbles: "Bubbles", monitor: "Guard"):
+    def __init__(self, clock: "DeviceClock", supply: "Supply", bubbles: "Bubbles", monitor: "FaultMonitor"):
         self.board = 0
         self.log = FaultLog()
         self._clock = clock
@@ -48,7 +48,7 @@ class LatchedFaults:
         bubbles = self._bubbles
         ticks = self._clock.ticks
         for bubble in range(bubbles.count):
-            new = self._monitor.unseen(bubble)
+            new = self._monitor.take_new_faults(bubble)
             bit = 1
             while new:
                 if new & 1:
@@ -68,8 +68,8 @@ class LatchedFaults:
         self.log.acknowledge(up_to)
         for bubble in range(self._bubbles.count):
             if self._bubble_ids[bubble] <= up_to:
-                self._bubbles.forget(bubble)
-                self._monitor.forget(bubble)
+                self._bubbles.clear_faults(bubble)
+                self._monitor.acknowledge(bubble)
         if self._board_id > up_to:
             return False
         self.board = 0

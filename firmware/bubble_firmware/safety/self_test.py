@@ -64,12 +64,12 @@ class SelfTest:
                 self._next(_WAIT)
         elif stage == _WAIT:
             if supply.pressure_pa >= _SUPPLY_PA:
-                self._drive(bubbles.pulses, self._pulse_us)
+                self._apply_pulse(bubbles.pulses, self._pulse_us)
                 self._next(_HOLD)
             elif self._time >= _WAIT_US:
                 self._end(SKIPPED)
         elif stage == _HOLD:
-            self._drive(bubbles.pulses, 0)
+            self._apply_pulse(bubbles.pulses, 0)
             if self._time >= _HOLD_US:
                 self.unfilled = self._take_rise(bubbles)
                 self._next(_RELEASE)
@@ -87,7 +87,7 @@ class SelfTest:
         ill = self.untrue_zero | self.unfilled | self.unvented
         self.outcome = FAILED if ill else outcome
 
-    def _drive(self, pulses, fill_us):
+    def _apply_pulse(self, pulses, fill_us):
         for index in range(0, len(pulses), 2):
             if not self.untrue_zero >> (index >> 1) & 1:  # no air where nobody sees it
                 pulses[index] = fill_us

@@ -116,7 +116,7 @@ class Player:
             playing = self.state != _WAITING
             self.cancel()
             if playing:
-                self._bubbles.hold()
+                self._bubbles.hold_position()
         self.id = number
         self.state = _LOADING
         self.reason = _UNENDED
@@ -199,7 +199,7 @@ class Player:
         self._depth = 0
         self.sequence.next = 0
         self._next(_UNENDED)
-        self._safety.take(_EVENT_SHOW)
+        self._safety.handle(_EVENT_SHOW)
 
     def _over(self, elapsed: int) -> int:
         """Why the step is over after so many ticks of it, UNENDED where it is not."""
@@ -282,7 +282,7 @@ class Player:
             self._carry_us = span_us % tick_us
         self.unsettled = 0
         self._moving = True
-        self._bubbles.begin(block, at + _HEAD, self._safety.mode != _ACTIVE)
+        self._bubbles.begin_step(block, at + _HEAD, self._safety.mode != _ACTIVE)
 
     def _end(self, reason: int, tick: int) -> None:
         self.running = False

@@ -8,8 +8,8 @@ from bubble_protocol.schema.settings import SETTINGS
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from bubble_firmware.safety.fault_monitor import Guard
-    from bubble_firmware.safety.state import Safety
+    from bubble_firmware.safety.deadman import Deadman
+    from bubble_firmware.safety.fault_monitor import FaultMonitor
 
 # [constants] bubble_protocol.schema.settings: BUDGET_KPA_S DEADMAN_HOLD DEADMAN_VENT
 _BUDGET_KPA_S = const(2)
@@ -21,8 +21,8 @@ _DEADMAN_VENT = const(1)
 class Settings:
     """`values` in use, one per setting; `lows` and `highs` are the hard limits; `version` counts changes since boot."""
 
-    def __init__(self, board: "ModuleType", safety: "Safety", monitor: "Guard"):
-        self._safety = safety
+    def __init__(self, board: "ModuleType", deadman: "Deadman", monitor: "FaultMonitor"):
+        self._deadman = deadman
         self._monitor = monitor
         self.count = len(SETTINGS)
         self.values = array("i")
@@ -72,5 +72,5 @@ class Settings:
 
     def _take_effect(self) -> None:
         values = self.values
-        self._safety.set_deadman(values[_DEADMAN_HOLD], values[_DEADMAN_VENT])
+        self._deadman.configure(values[_DEADMAN_HOLD], values[_DEADMAN_VENT])
         self._monitor.set_budget(values[_BUDGET_KPA_S])

@@ -1,28 +1,27 @@
 """The host's frame codec beside pymavlink's: encode and parse of a message with a payload of the same size, in turns."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from bubbleskin.bench.rows import Row
+from bubbleskin.bench.rows import Row, share_of
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.link import message
 
-_ROUNDS = 250  # short ones: what else the machine does falls between some of them
-_EACH = 40
+_ROUNDS = 250  # Short ones: what else the machine does falls between some of them.
+_CALLS = 40  # In a round.
 
 
-def rows() -> list[Row]:
+def rows(size: float = 1.0) -> Iterator[Row]:
     """µs for one message made, framed, taken apart and checked, and the same of pymavlink."""
-    found = []
-    shapes: list[tuple[str, str, tuple[int, ...], list[tuple[int, ...]]]] = [
+    kinds: list[tuple[str, str, tuple[int, ...], list[tuple[int, ...]]]] = [
         ("SHOW of 7", "SHOW", (300,), [(8000 + 100 * bubble,) for bubble in range(7)]),
         ("SHOW of 19", "SHOW", (300,), [(8000 + 100 * bubble,) for bubble in range(19)]),
         ("TELEMETRY of 7", "TELEMETRY", (123456, 1), [(8123, 21345, 8100, 2, 0)] * 7),
         ("TELEMETRY of 19", "TELEMETRY", (123456, 1), [(8123, 21345, 8100, 2, 0)] * 19),
     ]
-    for title, name, fixed, repeated in shapes:
+    for title, name, fixed, repeated in kinds:
         reader = message.Reader()
 
         def ours(
@@ -35,13 +34,10 @@ def rows() -> list[Row]:
 
         payload = len(message.encode(name, 1, fixed, repeated)) - 9
         theirs, their_name, their_payload = _mavlink(payload)
-        mine, other = _in_turns(ours, theirs)
-        found += [
-            Row(f"{title}, {payload} bytes: encode and parse", mine, "µs"),
-            Row(f"  {their_name}, {their_payload} bytes, in pymavlink", other, "µs"),
-            Row("  ours in theirs", mine / other, "×", "≤ 1"),
-        ]
-    return found
+        mine, other = _in_turns(share_of(_ROUNDS, size), ours, theirs)
+        yield Row(f"{title}, {payload} bytes: encode and parse", mine, "µs")
+        yield Row(f"  {their_name}, {their_payload} bytes, in pymavlink", other, "µs")
+        yield Row("  ours in theirs", mine / other, "×", "≤ 1")
 
 
 def _mavlink(payload: int) -> tuple[Callable[[], None], str, int]:
@@ -73,13 +69,13 @@ def _mavlink(payload: int) -> tuple[Callable[[], None], str, int]:
     return theirs, kind.msgname, kind.unpacker.size
 
 
-def _in_turns(*runs: Callable[[], None]) -> list[float]:
+def _in_turns(rounds: int, *runs: Callable[[], None]) -> list[float]:
     """The best time of one call of each, µs."""
     best = np.full(len(runs), np.inf)
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         for index, run in enumerate(runs):
             begin = time.perf_counter()
-            for _ in range(_EACH):
+            for _ in range(_CALLS):
                 run()
-            best[index] = min(best[index], (time.perf_counter() - begin) / _EACH * 1e6)
+            best[index] = min(best[index], (time.perf_counter() - begin) / _CALLS * 1e6)
     return best.tolist()

@@ -1,44 +1,62 @@
 """How fast touching bubbles are followed and planned, and how that grows with their number."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bubbleskin.bench.rows import Row
-from bubbleskin.contact.model import CompliantContact, Shape
+from bubbleskin.bench.rows import REPEATS, Row, fastest, share_of
+from bubbleskin.contact.model import CompliantContact
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
 from bubbleskin.planner.search import plan
 
-_REPEATS = 3  # the best of them counts: what else the machine does only makes it slower
 _SEED = 1
-_PRESSED = 26.69e3  # Pa; 12 mm alone, at a pitch of 10
+_RINGS = ((1, "< 0.1"), (2, "< 0.5"), (3, ""), (4, ""), (5, ""))
+"""Hexagons that are followed, 7 to 91 bubbles, and their targets in s."""
+_PRESSED = 26.69e3
+"""Pa; 12 mm alone, at a pitch of 10 mm."""
+_PLANS = ((1, 20, "< 1"), (2, 10, "< 10"))
+"""Hexagons that are planned for, how often, and their targets in s."""
 
 
-def rows() -> list[Row]:
+def rows(size: float = 1.0) -> Iterator[Row]:
     """Paths of 25 increments for 7 to 91 bubbles, plans for 7 and 19."""
-    found, size, spent = [], [], []
-    for rings, target in ((1, "< 0.1"), (2, "< 0.5"), (3, ""), (4, ""), (5, "")):
-        layout = Layout.hexagon(rings)
-        model = CompliantContact(layout)
-        pressures = _pressures(np.random.default_rng(_SEED), len(layout))
-        model.settle([pressures])  # compiled and cached
-        seconds, shape = _best(lambda model=model, p=pressures: model.settle([p]))  # type: ignore[misc]
-        size.append(len(shape.contacts))
+    repeats = share_of(REPEATS, size)
+    hexagons = _RINGS[: max(2, share_of(len(_RINGS), size))]
+    yield from _paths(hexagons, repeats)
+    yield _pressed(hexagons[-1][0], repeats)
+    for rings, count, target in _PLANS[: share_of(len(_PLANS), size)]:
+        yield _plans(rings, share_of(count, size), target)
+    yield _unreachable()
+
+
+def _paths(hexagons: tuple[tuple[int, str], ...], repeats: int) -> Iterator[Row]:
+    contacts, spent = [], []
+    for rings, target in hexagons:
+        model = CompliantContact(Layout.hexagon(rings))
+        path = [_pressures(np.random.default_rng(_SEED), len(model))]
+        model.settle(path)  # Compiled and cached.
+        seconds, shape = fastest(partial(model.settle, path), repeats)
+        contacts.append(len(shape.contacts))
         spent.append(seconds)
-        name = f"one path of 25 increments, {len(layout)} bubbles, {len(shape.contacts)} contacts, {shape.increments} relaxations"
-        found.append(Row(name, seconds, "s", target))
-    growth = float(np.polyfit(np.log(size), np.log(spent), 1)[0])
-    found.append(Row("growth of a path with its contacts, power", growth, "", "near 1"))
-    pressed = CompliantContact(Layout.hexagon(5))
-    seconds, shape = _best(lambda: pressed.settle([np.full(91, _PRESSED)]))
-    name = f"91 bubbles pressed hard: {len(shape.contacts)} contacts, {len(shape.snaps)} snaps, {shape.increments} relaxations"
-    return [*found, Row(name, seconds, "s"), _plans(1, 20, "< 1"), _unreachable(), _plans(2, 10, "< 10")]
+        name = f"one path of 25 increments, {len(model)} bubbles, {len(shape.contacts)} contacts, {shape.increments} relaxations"
+        yield Row(name, seconds, "s", target)
+    growth = float(np.polyfit(np.log(contacts), np.log(spent), 1)[0])
+    yield Row("growth of a path with its contacts, power", growth, "", "near 1")
 
 
-def _pressures(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Those of random heights from 5.5 to 13 mm alone."""
+def _pressed(rings: int, repeats: int) -> Row:
+    model = CompliantContact(Layout.hexagon(rings))
+    seconds, shape = fastest(partial(model.settle, [np.full(len(model), _PRESSED)]), repeats)
+    came = f"{len(shape.contacts)} contacts, {len(shape.snaps)} snaps, {shape.increments} relaxations"
+    return Row(f"{len(model)} bubbles pressed hard: {came}", seconds, "s")
+
+
+def _pressures(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+    """Those of random heights from 5.5 to 13 mm alone, (n,) Pa."""
     return np.asarray(YeohBalloon().pressure_at_height(rng.uniform(5.5e-3, 13e-3, n)))
 
 
@@ -56,17 +74,6 @@ def _plans(rings: int, count: int, target: str) -> Row:
 
 
 def _unreachable() -> Row:
-    """An even hexagon of 13 mm: it buckles, however one goes about it."""
-    layout = Layout.hexagon(1)
-    begin = time.process_time()
-    plan(np.full(7, 13.0), layout)
-    return Row("the nearest to a shape that 7 bubbles cannot have", time.process_time() - begin, "s", "< 1")
-
-
-def _best(work: Callable[[], Shape]) -> tuple[float, Shape]:
-    best = np.inf
-    for _ in range(_REPEATS):
-        begin = time.process_time()
-        shape = work()
-        best = min(best, time.process_time() - begin)
-    return best, shape
+    """An even hexagon of 13 mm: it buckles in whatever order it is inflated."""
+    seconds, _ = fastest(partial(plan, np.full(7, 13.0), Layout.hexagon(1)), 1)
+    return Row("the nearest to a shape that 7 bubbles cannot have", seconds, "s", "< 1")

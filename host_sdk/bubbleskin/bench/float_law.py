@@ -222,7 +222,7 @@ class Bubbles:
         self.ticks = 1
         self.mode = 0
 
-    def show(self, heights, ticks):
+    def set_targets(self, heights, ticks):
         """Ramp to `heights` within so many ticks."""
         for bubble, height in zip(self.bubbles, heights):  # noqa: B905 - MicroPython has no strict
             bubble.start = bubble.height

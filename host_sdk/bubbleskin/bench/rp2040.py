@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bubble_firmware.control import step
+from bubble_firmware.control import state_layout as layout
 from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.table import Tables
 from bubbleskin.bench import float_law
@@ -31,6 +31,7 @@ _PHASES = (
     ("coming to rest", 0.4, 0.0, 0.0),
     ("at rest", 0.1, 0.0, 0.0),
 )
+_EDGES = (layout.FIRST_SEGMENT, layout.LAST_SEGMENT)
 _CHUNK = 20  # ticks sent to the prompt at once
 _SAME_US = 20  # so near, two pulses count as one
 _SAME_UM = 50
@@ -72,7 +73,7 @@ def replay(ticks):
 _FIXED = """
 law = bubbles.Bubbles(data, table.Tables(data.BUBBLES))
 def show(heights, over):
-    law.show(array("i", heights), 0, over)
+    law.set_targets(array("i", heights), 0, over)
 def decided():
     return " ".join(map(str, law.pulses))
 """
@@ -80,7 +81,7 @@ def decided():
 _FLOAT = """
 law = Bubbles(data, {curves!r})
 def show(heights, over):
-    law.show(heights, over)
+    law.set_targets(heights, over)
 def decided():
     return " ".join([str(int(width + 0.5)) for width in law.pulses()])
 """
@@ -130,10 +131,11 @@ def curves(board: str) -> list[list[tuple[float, int, int]]]:
     bubbles = Bubbles(data, Tables(data.BUBBLES))
     found = []
     for i in range(data.BUBBLES):
-        first, last = (bubbles._rows[i * step.ROW + edge] // 4 for edge in (step.FIRST, step.LAST))
-        knots = range(first, last + 2 * step.KNOT, step.KNOT)
-        words = bubbles._curves
-        found.append([(words[k + step.H] / 16, words[k + step.A], words[k + step.P]) for k in knots])
+        first, last = (bubbles.rows[i * layout.ROW_WORDS + edge] // 4 for edge in _EDGES)
+        knots = range(first, last + 2 * layout.KNOT_WORDS, layout.KNOT_WORDS)
+        places = (layout.KNOT_HEIGHT, layout.KNOT_AIR, layout.KNOT_PRESSURE)
+        heights, air, pressures = ([bubbles.curves[knot + place] for knot in knots] for place in places)
+        found.append([(h / 16, a, p) for h, a, p in zip(heights, air, pressures, strict=True)])
     return found
 
 

@@ -1,37 +1,40 @@
 """How fast simulated wristbands run: virtual seconds per second of one core."""
 
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
 from bubbleskin.bench.rows import Row
-from bubbleskin.link.link import run_sync
-from bubbleskin.sim.board import SimulatedBoard
-from bubbleskin.sim.transport import SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.connect import connect
 
-_VIRTUAL = 20.0  # seconds
-_EVERY = 2.0  # seconds between two shows
+_SECONDS = 20.0
+"""Of virtual time, for each row."""
+_EVERY = 2.0
+"""Virtual seconds between two shows."""
 
 
-def rows() -> list[Row]:
+def rows(size: float = 1.0) -> Iterator[Row]:
     """The firmware in process, with a new random shape every 2 s, and at rest."""
-    return [
-        _run("sim://wristband7, a new shape every 2 s", "wristband7", moving=True, target="≥ 20"),
-        _run("sim://wristband7, at rest", "wristband7", moving=False, target=""),
-        _run("sim://wristband19, a new shape every 2 s", "wristband19", moving=True, target=""),
-    ]
+    for url, moving, target in (
+        ("sim://wristband7", True, "≥ 20"),
+        ("sim://wristband7", False, ""),
+        ("sim://wristband19", True, ""),
+    ):
+        what = f"a new shape every {_EVERY:g} s" if moving else "at rest"
+        yield Row(f"{url}, {what}", _speed(url, moving, size * _SECONDS), "× real time", target)
 
 
-def _run(name: str, board_name: str, *, moving: bool, target: str) -> Row:
-    board = SimulatedBoard(board_name, seed=1)
-    skin = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, board_name), 2.0)))
-    rng = np.random.default_rng(1)
-    skin.sleep(0.5)  # compiled, cached and warm
-    begin, cpu = board.time, time.process_time()
-    while board.time - begin < _VIRTUAL:
-        if moving:
-            skin.show(rng.uniform(5.5, 12.5, len(skin.layout)), wait=False)
-        skin.sleep(_EVERY)
-    spent = time.process_time() - cpu
-    return Row(name, (board.time - begin) / spent, "× real time", target)
+def _speed(url: str, moving: bool, seconds: float) -> float:
+    """Virtual seconds in a second of processor time, over so many virtual ones."""
+    with connect(f"{url}?seed=1") as skin:
+        board = skin.simulated
+        assert board is not None
+        rng = np.random.default_rng(1)
+        skin.sleep(0.5)  # Compiled, cached and warm.
+        begin, cpu = board.time, time.process_time()
+        while board.time - begin < seconds:
+            if moving:
+                skin.show(rng.uniform(5.5, 12.5, len(skin.layout)), wait=False)
+            skin.sleep(min(_EVERY, seconds))
+        return (board.time - begin) / (time.process_time() - cpu)

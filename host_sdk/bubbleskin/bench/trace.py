@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bubbleskin.sim.board import InProcessFirmware, SimulatedBoard, load_board
+from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.firmware import InProcessFirmware
 
 BOOT_ID = 1
 

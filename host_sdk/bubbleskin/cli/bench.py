@@ -1,8 +1,6 @@
 """`bubbleskin bench`: measure and print."""
 
 import json as jsonlib
-from collections.abc import Callable, Iterable
-from importlib import import_module
 from importlib.util import find_spec
 
 import click
@@ -10,15 +8,19 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from bubbleskin.bench import BENCHES, measure
 from bubbleskin.bench.rows import Row
 from bubbleskin.cli.options import as_json
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
-_PARTS = ("simulation", "membrane", "contact", "codec", "link", "clock")
+_HELP = f"""Measure speeds and print them beside their targets.
+
+PART: {", ".join(f"{name} ({what})" for name, what in BENCHES.items())}. Without one, all.
+"""
 
 
-@click.command()
-@click.argument("parts", nargs=-1, type=click.Choice(_PARTS), metavar="[PART]...")
+@click.command(help=_HELP)
+@click.argument("parts", nargs=-1, type=click.Choice(tuple(BENCHES)), metavar="[PART]...")
 @click.option(
     "--target",
     type=click.Choice(("host", "rp2040")),
@@ -28,12 +30,7 @@ _PARTS = ("simulation", "membrane", "contact", "codec", "link", "clock")
 )
 @as_json
 def bench(parts: tuple[str, ...], target: str, json: bool) -> None:
-    """Measure speeds and print them beside their targets.
-
-    PART: simulation (how fast simulated wristbands run), membrane (inversions, tables, fits), contact (shapes of
-    bubbles that touch, and plans), codec (frames, beside pymavlink), link (round trips over a pseudo-terminal, beside a
-    plain echo) or clock (error of the device's time under jitter). Without one, all.
-    """
+    """Print what `bubbleskin.bench` measures."""
     console = Console(stderr=json)
     rows: list[Row] = []
     if target == "rp2040":
@@ -46,17 +43,16 @@ def bench(parts: tuple[str, ...], target: str, json: bool) -> None:
         with console.status("emulating …") as status:
             for row in rp2040.rows():
                 rows.append(row)
-                status.update(f"emulating … {row.name}: {row.figure:.3g} {row.unit}")
+                status.update(f"emulating … {row.name}: {row.value:.3g} {row.unit}")
     else:
-        for part in track(parts or _PARTS, "measuring", console=console, transient=True):
-            measure: Callable[[], Iterable[Row]] = import_module(f"bubbleskin.bench.{part}").rows
-            rows += measure()
+        for part in track(parts or tuple(BENCHES), "measuring", console=console, transient=True):
+            rows += measure(part)
     if json:
         click.echo(jsonlib.dumps([row._asdict() for row in rows], indent=2))
         return
-    table = Table("what", "figure", "unit", "target")
+    table = Table("what", "value", "unit", "target")
     for row in rows:
-        table.add_row(row.name, f"{row.figure:.3g}", row.unit, row.target)
+        table.add_row(row.name, f"{row.value:.3g}", row.unit, row.target)
     console.print(table)
 
 

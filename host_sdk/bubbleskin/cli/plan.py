@@ -17,7 +17,7 @@ from bubbleskin.shape import shapes
 from bubbleskin.shape.heightfield import Heights
 
 if TYPE_CHECKING:
-    from bubbleskin.planner.search import Plan
+    from bubbleskin.planner.plan import Plan
 
 _BOARDS = {"wristband7": 7, "wristband19": 19}
 _FILE = click.Path(dir_okay=False, path_type=Path)

@@ -2,14 +2,15 @@
 
 A state is an (n, 4) array in m: centre x, y, z of each bubble and its outer radius R. Per bubble
 
-    U(R) − P V(R)                      membrane and air (FACTS: 4π r0² h0 W(λ) − P (4/3) π R³)
+    U(R) − P V(R)                      membrane and air; of a thin wall 4π r0² h0 W(λ) − P (4/3) π R³
     ½ kxy |xy − barb|²                 the neck holds sideways
     ½ kz (z − R)²                      up the neck pulls softly (kz_up), down the base pushes (kz_down)
 
 and per pair ½ kc max(0, Ri + Rj − |ci − cj|)². `bubbles` is an array of `BUBBLE`, `springs` one `SPRINGS` record,
 `pairs` an (m, 2) array of those that could touch: the work grows with it. `mechanics` is necks, base and contact
-alone, for a plant that integrates membranes and air itself. All SI; nothing is checked, nothing allocated. Not cached:
-`relax` caches what calls these, together with them.
+alone, for a plant that integrates membranes and air itself. All SI; nothing is checked, nothing allocated. The functions
+here are not cached on disk by themselves: `relax` caches what calls them, together with them. `docs/contact.md` explains
+the energy and where the springs come from.
 """
 
 import math
@@ -30,29 +31,34 @@ SPRINGS = np.dtype([(name, "f8") for name in ("kz_up", "kz_down", "kxy", "kc")])
 
 _energy_density = njit(wall.energy_density)
 _energy_slope = njit(wall.energy_slope)
-_antiderivative = njit(wall._antiderivative)
+_pressure_antiderivative = njit(wall.pressure_antiderivative)
 _yeoh_pressure = njit(balloon.yeoh_pressure)
 
 
 @njit
-def membrane(R, b):  # type: ignore[no-untyped-def]
-    """Strain energy, the pressure it holds and that pressure's slope dP/dR, at outer radius R."""
-    if not b.thick:
-        x = R / b.radius
+def membrane(R, bubble):  # type: ignore[no-untyped-def]
+    """Strain energy U (J), the pressure P (Pa) it holds and dP/dR (Pa/m) of one `bubble` at outer radius `R` (m).
+
+    The formulas are those of `membrane.wall` (the paper's Eq. 3 and 7, and the exact thick wall), by R instead of λ.
+    """
+    mu, c2, c3 = bubble.mu, bubble.c2, bubble.c3
+    if not bubble.thick:
+        x = R / bubble.radius
         J = 2.0 * x * x + x**-4 - 3.0
         dJ = 4.0 * (x - x**-5)
-        dW = _energy_slope(x, b.mu, b.c2, b.c3)
-        P = _yeoh_pressure(x, b.mu, b.c2, b.c3, b.thickness, b.radius)
-        dP = (6.0 * b.c3 * J + 2.0 * b.c2) * dJ * (1.0 / x - x**-7) + dW * (7.0 * x**-8 - x**-2)
-        U = 4.0 * math.pi * b.radius**2 * b.thickness * _energy_density(x, b.mu, b.c2, b.c3)
-        return U, P, 4.0 * b.thickness / b.radius**2 * dP
-    a = (R**3 - b.outer**3 + b.inner**3) ** (1.0 / 3.0)
-    xa, xb = a / b.inner, R / b.outer
-    P = _antiderivative(xa, b.mu, b.c2, b.c3) - _antiderivative(xb, b.mu, b.c2, b.c3)
-    at_a = 4.0 * _energy_slope(xa, b.mu, b.c2, b.c3) * (xa**-2 + xa**-5) * (R / a) ** 2 / b.inner
-    at_b = 4.0 * _energy_slope(xb, b.mu, b.c2, b.c3) * (xb**-2 + xb**-5) / b.outer
-    W_a, W_b = _energy_density(xa, b.mu, b.c2, b.c3), _energy_density(xb, b.mu, b.c2, b.c3)
-    U = 4.0 / 3.0 * math.pi * ((R**3 - b.outer**3) * P + b.outer**3 * W_b - b.inner**3 * W_a)
+        dW = _energy_slope(x, mu, c2, c3)
+        P = _yeoh_pressure(x, mu, c2, c3, bubble.thickness, bubble.radius)
+        dP = (6.0 * c3 * J + 2.0 * c2) * dJ * (1.0 / x - x**-7) + dW * (7.0 * x**-8 - x**-2)
+        U = 4.0 * math.pi * bubble.radius**2 * bubble.thickness * _energy_density(x, mu, c2, c3)
+        return U, P, 4.0 * bubble.thickness / bubble.radius**2 * dP
+    A, B = bubble.inner, bubble.outer
+    a = (R**3 - B**3 + A**3) ** (1.0 / 3.0)
+    xa, xb = a / A, R / B
+    P = _pressure_antiderivative(xa, mu, c2, c3) - _pressure_antiderivative(xb, mu, c2, c3)
+    at_a = 4.0 * _energy_slope(xa, mu, c2, c3) * (xa**-2 + xa**-5) * (R / a) ** 2 / A
+    at_b = 4.0 * _energy_slope(xb, mu, c2, c3) * (xb**-2 + xb**-5) / B
+    W_a, W_b = _energy_density(xa, mu, c2, c3), _energy_density(xb, mu, c2, c3)
+    U = 4.0 / 3.0 * math.pi * ((R**3 - B**3) * P + B**3 * W_b - A**3 * W_a)
     return U, P, at_a - at_b
 
 
@@ -61,13 +67,13 @@ def mechanics(state, bubbles, springs, pairs, gradient):  # type: ignore[no-unty
     """Energy (J) of necks, base and contact; their gradient (N) is *added* to `gradient`, (n, 4)."""
     E = 0.0
     for i in range(len(state)):
-        dx, dy, q = state[i, 0] - bubbles[i].x, state[i, 1] - bubbles[i].y, state[i, 2] - state[i, 3]
-        kz = springs.kz_up if q > 0.0 else springs.kz_down
-        E += 0.5 * (springs.kxy * (dx * dx + dy * dy) + kz * q * q)
+        dx, dy, lift = state[i, 0] - bubbles[i].x, state[i, 1] - bubbles[i].y, state[i, 2] - state[i, 3]
+        kz = springs.kz_up if lift > 0.0 else springs.kz_down
+        E += 0.5 * (springs.kxy * (dx * dx + dy * dy) + kz * lift * lift)
         gradient[i, 0] += springs.kxy * dx
         gradient[i, 1] += springs.kxy * dy
-        gradient[i, 2] += kz * q
-        gradient[i, 3] -= kz * q
+        gradient[i, 2] += kz * lift
+        gradient[i, 3] -= kz * lift
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         ux, uy, uz = state[i, 0] - state[j, 0], state[i, 1] - state[j, 1], state[i, 2] - state[j, 2]
@@ -75,17 +81,17 @@ def mechanics(state, bubbles, springs, pairs, gradient):  # type: ignore[no-unty
         squared = ux * ux + uy * uy + uz * uz
         if squared >= reach * reach:
             continue
-        d = math.sqrt(squared)
-        force = springs.kc * (reach - d)
-        E += 0.5 * force * (reach - d)
-        f = force / max(d, 1e-12)
-        gradient[i, 0] -= f * ux
-        gradient[i, 1] -= f * uy
-        gradient[i, 2] -= f * uz
+        distance = math.sqrt(squared)
+        force = springs.kc * (reach - distance)
+        E += 0.5 * force * (reach - distance)
+        force_by_distance = force / max(distance, 1e-12)
+        gradient[i, 0] -= force_by_distance * ux
+        gradient[i, 1] -= force_by_distance * uy
+        gradient[i, 2] -= force_by_distance * uz
         gradient[i, 3] += force
-        gradient[j, 0] += f * ux
-        gradient[j, 1] += f * uy
-        gradient[j, 2] += f * uz
+        gradient[j, 0] += force_by_distance * ux
+        gradient[j, 1] += force_by_distance * uy
+        gradient[j, 2] += force_by_distance * uz
         gradient[j, 3] += force
     return E
 
@@ -96,11 +102,11 @@ def gradient(state, pressure, bubbles, springs, pairs, out):  # type: ignore[no-
     out[:] = 0.0
     E = mechanics(state, bubbles, springs, pairs, out)
     for i in range(len(state)):
-        b, R = bubbles[i], state[i, 3]
-        U, P, _ = membrane(R, b)
+        bubble, R = bubbles[i], state[i, 3]
+        U, P, _ = membrane(R, bubble)
         # Outside and inside bound the same rubber, so dV = 4π R² dR holds for a thick wall too.
         out[i, 3] += 4.0 * math.pi * R * R * (P - pressure[i])
-        E += U - pressure[i] * 4.0 / 3.0 * math.pi * (R**3 - b.outer**3 + b.inner**3)
+        E += U - pressure[i] * 4.0 / 3.0 * math.pi * (R**3 - bubble.outer**3 + bubble.inner**3)
     return E
 
 
@@ -108,44 +114,49 @@ def gradient(state, pressure, bubbles, springs, pairs, out):  # type: ignore[no-
 def curvature(state, pressure, bubbles, springs, pairs, blocks, contacts):  # type: ignore[no-untyped-def]
     """Prepare `hessian`: 4 by 4 `blocks` of each bubble, (n, 4, 4), and `contacts`, (m, 5).
 
-    A row of `contacts`: direction from j to i, curvature kc along it, and −force/distance across it (0, 0: no contact).
+    An entry of `contacts`: direction from j to i, curvature kc along it, and −force/distance across it (0, 0: no contact).
     """
     blocks[:] = 0.0
     for i in range(len(state)):
         R = state[i, 3]
         kz = springs.kz_up if state[i, 2] > R else springs.kz_down
         _, P, dP = membrane(R, bubbles[i])
-        B = blocks[i]
-        B[0, 0] = B[1, 1] = springs.kxy
-        B[2, 2] = kz
-        B[2, 3] = B[3, 2] = -kz
-        B[3, 3] = kz + 4.0 * math.pi * R * (2.0 * (P - pressure[i]) + R * dP)
+        block = blocks[i]
+        block[0, 0] = block[1, 1] = springs.kxy
+        block[2, 2] = kz
+        block[2, 3] = block[3, 2] = -kz
+        block[3, 3] = kz + 4.0 * math.pi * R * (2.0 * (P - pressure[i]) + R * dP)
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
-        c = contacts[k]
+        contact = contacts[k]
         reach = state[i, 3] + state[j, 3]
         squared = 0.0
         for a in range(3):
-            c[a] = state[i, a] - state[j, a]
-            squared += c[a] * c[a]
-        c[3] = c[4] = 0.0
+            contact[a] = state[i, a] - state[j, a]
+            squared += contact[a] * contact[a]
+        contact[3] = contact[4] = 0.0
         if squared >= reach * reach:
             continue
-        d = max(math.sqrt(squared), 1e-12)
-        across = -springs.kc * (reach - d) / d
-        c[3], c[4] = springs.kc, across
+        distance = max(math.sqrt(squared), 1e-12)
+        across = -springs.kc * (reach - distance) / distance
+        contact[3], contact[4] = springs.kc, across
         for a in range(3):
-            c[a] /= d
-        for e in range(2):
-            B = blocks[pairs[k, e]]
-            sign = 1.0 - 2.0 * e
-            for a in range(3):
-                for b in range(3):
-                    B[a, b] += (springs.kc - across) * c[a] * c[b]
-                B[a, a] += across
-                B[a, 3] -= sign * springs.kc * c[a]
-                B[3, a] -= sign * springs.kc * c[a]
-            B[3, 3] += springs.kc
+            contact[a] /= distance
+        _stiffen(blocks[i], 1.0, contact)
+        _stiffen(blocks[j], -1.0, contact)
+
+
+@njit
+def _stiffen(block, sign, contact):  # type: ignore[no-untyped-def]
+    """Add to one bubble's `block` what its own side of `contact` gives; `sign` is 1 for bubble i, −1 for j."""
+    along, across = contact[3], contact[4]
+    for a in range(3):
+        for b in range(3):
+            block[a, b] += (along - across) * contact[a] * contact[b]
+        block[a, a] += across
+        block[a, 3] -= sign * along * contact[a]
+        block[3, a] -= sign * along * contact[a]
+    block[3, 3] += along
 
 
 @njit
@@ -153,19 +164,20 @@ def hessian(v, pairs, blocks, contacts, out):  # type: ignore[no-untyped-def]
     """`out` = H v, both (n, 4), from what `curvature` prepared."""
     for i in range(len(v)):
         for a in range(4):
-            B = blocks[i, a]
-            out[i, a] = B[0] * v[i, 0] + B[1] * v[i, 1] + B[2] * v[i, 2] + B[3] * v[i, 3]
+            row = blocks[i, a]
+            out[i, a] = row[0] * v[i, 0] + row[1] * v[i, 1] + row[2] * v[i, 2] + row[3] * v[i, 3]
     for k in range(len(pairs)):
-        c = contacts[k]
-        if c[3] == 0.0:
+        contact = contacts[k]
+        along, across = contact[3], contact[4]
+        if along == 0.0:
             continue
         i, j = pairs[k, 0], pairs[k, 1]
         # The part of H that couples i and j: −(∇²) of the distance, and how each one's radius pushes the other.
-        ci = c[0] * v[i, 0] + c[1] * v[i, 1] + c[2] * v[i, 2]
-        cj = c[0] * v[j, 0] + c[1] * v[j, 1] + c[2] * v[j, 2]
-        along = c[3] - c[4]
+        vi = contact[0] * v[i, 0] + contact[1] * v[i, 1] + contact[2] * v[i, 2]
+        vj = contact[0] * v[j, 0] + contact[1] * v[j, 1] + contact[2] * v[j, 2]
+        excess = along - across
         for a in range(3):
-            out[i, a] -= along * cj * c[a] + c[4] * v[j, a] + c[3] * c[a] * v[j, 3]
-            out[j, a] -= along * ci * c[a] + c[4] * v[i, a] - c[3] * c[a] * v[i, 3]
-        out[i, 3] += c[3] * (cj + v[j, 3])
-        out[j, 3] += c[3] * (v[i, 3] - ci)
+            out[i, a] -= excess * vj * contact[a] + across * v[j, a] + along * contact[a] * v[j, 3]
+            out[j, a] -= excess * vi * contact[a] + across * v[i, a] - along * contact[a] * v[i, 3]
+        out[i, 3] += along * (vj + v[j, 3])
+        out[j, 3] += along * (v[i, 3] - vi)

@@ -1,5 +1,7 @@
 """Bubbles that touch, as a user meets them: the paper's rigid rule and the compliant model, and the shapes they give."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -8,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bubbleskin.contact import energy as core
-from bubbleskin.contact.continuation import HALVINGS, MOVE, Outcome, PathFollower, Snap, ramps
+from bubbleskin.contact.continuation import FINE, Outcome, PathFollower, Resolution, Snap, ramps
 from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
 from bubbleskin.errors import InvalidInput, NoEquilibrium
 from bubbleskin.layout import Layout
@@ -20,7 +22,7 @@ Array = NDArray[np.float64]
 Ramp = Literal["pressure", "height"]
 
 KZ, KXY, KC, KBASE = 10.0, 50.0, 300.0, 3000.0
-"""N/m. The preset: with these the model gives the paper's three heights (`tools/report/contact.py`)."""
+"""N/m. The preset: with these springs the model gives the paper's three heights (`tools/report/contact.py`)."""
 
 LINE_VOLUME = 0.2e-6
 """m³ of air in valve node and tube of the simulated boards."""
@@ -77,13 +79,13 @@ class Shape:
 
 
 class CompliantContact:
-    """Elastic bubbles on soft necks that push each other: FACTS' energy, for any layout.
+    """Elastic bubbles on soft necks that push each other, for any layout: the least energy of `contact/energy.py`.
 
     `balloon` is one for all or one per bubble. Springs in N/m: `kz` the neck upwards, `kxy` the neck sideways, `kc` the
     contact of two bubbles, `kbase` the base plane. `kick` (m) is the size of the random nudges that find the stable
-    branch, `seed` theirs: the same calls give the same bytes. `increments` per step of `settle`, halved where needed.
+    branch, `seed` theirs: the same calls give the same bytes.
 
-    Raises `InvalidInput` for figures that nothing has, and for two bubbles in one place.
+    Raises `InvalidInput` for springs that are not positive, and for two bubbles in one place.
     """
 
     def __init__(
@@ -97,17 +99,14 @@ class CompliantContact:
         kbase: float = KBASE,
         kick: float = 1e-7,
         seed: int = 0,
-        increments: int = 25,
     ) -> None:
         self.layout = layout
         self.balloons = balloons_of(balloon, layout)
         for name, value in (("kz", kz), ("kxy", kxy), ("kc", kc), ("kbase", kbase)):
             positive(name, number(name, value), "N/m")
         self.kz, self.kxy, self.kc, self.kbase = float(kz), float(kxy), float(kc), float(kbase)
-        if increments < 1:
-            raise InvalidInput(f"A step is followed in 1 or more increments; {increments} were asked.")
-        self.kick, self.seed, self.increments = number("kick", kick), seed, int(increments)
-        self.bubbles = _records(layout, self.balloons)
+        self.kick, self.seed = number("kick", kick), seed
+        self.bubbles = _bubble_records(layout, self.balloons)
         gap = layout.positions_mm[:, None] - layout.positions_mm[None]
         close = np.argwhere(np.triu(np.hypot(*gap.transpose(2, 0, 1)) < 1e-3, 1))
         if len(close):
@@ -123,9 +122,22 @@ class CompliantContact:
         """`kz`, `kbase`, `kxy`, `kc`, as in `energy.SPRINGS`."""
         return self.kz, self.kbase, self.kxy, self.kc
 
+    def with_seed(self, seed: int) -> CompliantContact:
+        """The same model with other random nudges."""
+        return CompliantContact(
+            self.layout,
+            self.balloons,
+            kz=self.kz,
+            kxy=self.kxy,
+            kc=self.kc,
+            kbase=self.kbase,
+            kick=self.kick,
+            seed=seed,
+        )
+
     def rest(self) -> Shape:
         """Every bubble without pressure."""
-        return self.settle(np.zeros((1, len(self))), increments=1)
+        return self.settle(np.zeros((1, len(self))), resolution=Resolution(increments=1))
 
     def settle(
         self,
@@ -133,22 +145,22 @@ class CompliantContact:
         start: Shape | None = None,
         *,
         ramp: Ramp = "pressure",
-        increments: int | None = None,
-        move_mm: float = 1e3 * MOVE,
-        halvings: int = HALVINGS,
+        resolution: Resolution = FINE,
         strict: bool = False,
     ) -> Shape:
         """Follow `steps`, (k, n) gauge pressures in Pa, one after the other from `start` (flat without one).
 
         On the way to a step all pressures change in proportion; with `ramp="height"` the heights that the bubbles would
         have alone do, as on a device. The result is where the bubbles are after the last step. An increment that moves
-        a bubble further than `move_mm` is halved, up to `halvings` times; where that does not help, it is a snap.
+        a bubble too far for the `resolution` is halved; where that does not help any more, it is a snap.
 
         `Shape.converged` is False where no equilibrium was found, `residual` the force that is left then; with
         `strict` that raises `NoEquilibrium`. Raises `InvalidInput` for pressures that no bubble holds.
         """
         targets = self._pressures(steps)
-        positive("move_mm", number("move_mm", move_mm), "mm")
+        if resolution.increments < 1:
+            raise InvalidInput(f"A step is followed in 1 or more increments; {resolution.increments} were asked.")
+        positive("move_mm", number("move_mm", resolution.move_mm), "mm")
         one_of("ramp", ramp, ("pressure", "height"))
         if start is not None and len(start) != len(self):
             raise InvalidInput(f"The shape to start from has {len(start)} bubbles, the layout {len(self)}.")
@@ -159,34 +171,37 @@ class CompliantContact:
             for target in targets:
                 radii.append(self.free_radius(target, radii[-1]))
         state = self._flat() if start is None else start.state
-        walker = PathFollower(
-            self.bubbles, self.springs, state, kick=self.kick, seed=self.seed, move=1e-3 * move_mm, halvings=halvings
+        follower = PathFollower(
+            self.bubbles, self.springs, state, kick=self.kick, seed=self.seed, resolution=resolution
         )
         path = ramps(begin, targets, None if radii is None else np.array(radii), self.bubbles)
-        for number_, pressures in enumerate(path):
-            walker.step(number_, pressures, self.increments if increments is None else increments)
-            if walker.ended != CONVERGED:
+        for step, pressures in enumerate(path):
+            follower.follow(step, pressures)
+            if follower.ended != CONVERGED:
                 break
-        shape = self._shape(walker.outcome(), targets[-1], walker.pairs)
+        shape = self._shape(follower.outcome(), targets[-1], follower.pairs)
         if strict and not shape.converged:
-            how = "a bubble grows without end" if walker.ended == BURST else f"{shape.residual:.1e} N are left"
+            how = "a bubble grows without end" if follower.ended == BURST else f"{shape.residual:.1e} N are left"
             raise NoEquilibrium(
-                f"No equilibrium on the way to step {number_}: {how}. Ask for less pressure, or follow in more increments."
+                f"No equilibrium on the way to step {step}: {how}. Ask for less pressure, or follow in more increments."
             )
         return shape
 
     def free_radius(self, pressure: ArrayLike, near: ArrayLike | None = None) -> Array:
-        """Outer radius (m) of each bubble if it stood alone at `pressure`, (n,) Pa; of several the one nearest to `near`."""
+        """Outer radius (m) of each bubble if it stood alone at `pressure`, (n,) Pa.
+
+        Where there are several, the one nearest to `near`, (n,) m, or the smallest.
+        """
         p = np.broadcast_to(np.asarray(pressure, dtype=float), (len(self),))
         found = np.empty(len(self))
         for balloon in set(self.balloons):
-            its = np.flatnonzero([one == balloon for one in self.balloons])
-            branches = np.atleast_2d(balloon.heights(p[its])) / 2
+            bubbles = np.flatnonzero([one == balloon for one in self.balloons])
+            branches = np.atleast_2d(balloon.heights(p[bubbles])) / 2
             if near is None:
-                found[its] = branches[:, 0]
+                found[bubbles] = branches[:, 0]
             else:
-                off = np.abs(branches - np.asarray(near, dtype=float)[its, None])
-                found[its] = branches[np.arange(len(its)), np.nanargmin(off, axis=1)]
+                off = np.abs(branches - np.asarray(near, dtype=float)[bubbles, None])
+                found[bubbles] = branches[np.arange(len(bubbles)), np.nanargmin(off, axis=1)]
         return found
 
     def free_pressure(self, height_mm: ArrayLike) -> Array:
@@ -197,12 +212,15 @@ class CompliantContact:
         return np.maximum(held, 0.0)
 
     def height_by_air(self, shape: Shape, line_volume: float = LINE_VOLUME) -> Array:
-        """Height in mm of each bubble alone with the air (pV, line included) that it has in `shape`, (n,)."""
+        """Height in mm of each bubble alone with the air that it has in `shape`, (n,).
+
+        Air is pressure times volume, of the bubble and of its `line_volume` (m³).
+        """
         found = np.empty(len(self))
         for i, balloon in enumerate(self.balloons):
             air = (ATMOSPHERE + shape.pressure[i]) * (balloon.volume(shape.stretch[i]) + line_volume)
             low, high = balloon.stretch_at_height(balloon.rest_height), 8.0
-            for _ in range(60):  # air grows with the stretch: halving cannot miss
+            for _ in range(60):  # Air grows with the stretch: halving cannot miss.
                 middle = (low + high) / 2
                 more = (ATMOSPHERE + balloon.pressure(middle)) * (balloon.volume(middle) + line_volume) > air
                 low, high = (low, middle) if more else (middle, high)
@@ -218,8 +236,8 @@ class CompliantContact:
         n = len(self)
         rhs, out = np.zeros((n, n, 4)), np.zeros((n, n, 4))
         rhs[np.arange(n), np.arange(n), 3] = 4 * np.pi * shape.radius**2
-        walker = self._walker(shape)
-        if not solve(shape.state, shape.pressure, self.bubbles, walker.springs, walker.pairs, rhs, out, 1e-9):
+        at = self._follower_at(shape.state)
+        if not solve(shape.state, shape.pressure, self.bubbles, at.springs, at.pairs, rhs, out, 1e-9):
             raise NoEquilibrium("The shape is about to snap: its heights have no slope. Change a pressure a little.")
         return np.asarray((out[:, :, 2] + out[:, :, 3]).T)
 
@@ -231,22 +249,17 @@ class CompliantContact:
         """Its gradient, (n, 4) N; zero in equilibrium."""
         return self._evaluate(state, pressure)[1]
 
-    # Inside.
-
     def _evaluate(self, state: Array, pressure: ArrayLike) -> tuple[float, Array]:
         state = np.ascontiguousarray(state, dtype=float)
         p = np.array(np.broadcast_to(np.asarray(pressure, dtype=float), (len(self),)))
-        walker = PathFollower(self.bubbles, self.springs, state)
-        aside = np.hypot(state[:, 0] - self.bubbles["x"], state[:, 1] - self.bubbles["y"]).max()
-        walker.reach(float(state[:, 3].max() + aside))
-        out = np.empty_like(state)
-        return float(evaluate(state, p, self.bubbles, walker.springs, walker.pairs, out)), out
+        at, out = self._follower_at(state), np.empty_like(state)
+        return float(evaluate(state, p, self.bubbles, at.springs, at.pairs, out)), out
 
-    def _walker(self, shape: Shape) -> PathFollower:
-        walker = PathFollower(self.bubbles, self.springs, shape.state)
-        aside = np.hypot(shape.state[:, 0] - self.bubbles["x"], shape.state[:, 1] - self.bubbles["y"]).max()
-        walker.reach(float(shape.radius.max() + aside))
-        return walker
+    def _follower_at(self, state: Array) -> PathFollower:
+        """A follower at `state` that knows all pairs which touch there."""
+        follower = PathFollower(self.bubbles, self.springs, state)
+        follower.find_pairs_of_state()
+        return follower
 
     def _flat(self) -> Array:
         r = self.bubbles["outer"]
@@ -258,9 +271,9 @@ class CompliantContact:
             raise InvalidInput(
                 f"Steps are a (k, {len(self)}) array, a gauge pressure in Pa per bubble and step; this one is {targets.shape}."
             )
-        for balloon in set(self.balloons):  # refuses what is negative or more than it holds, in its own words
-            its = [one == balloon for one in self.balloons]
-            balloon.stretches(np.array([targets[:, its].min(), targets[:, its].max()]))
+        for balloon in set(self.balloons):  # Each refuses what is negative or more than it holds, in its own words.
+            bubbles = [one == balloon for one in self.balloons]
+            balloon.stretches(np.array([targets[:, bubbles].min(), targets[:, bubbles].max()]))
         return targets
 
     def _shape(self, outcome: Outcome, pressure: Array, pairs: NDArray[np.int64]) -> Shape:
@@ -271,12 +284,12 @@ class CompliantContact:
             Contact(int(i[k]), int(j[k]), self.kc * float(overlap[k]), 1e3 * float(overlap[k]))
             for k in np.flatnonzero(overlap > 0)
         )
-        b = self.bubbles
-        stretch = np.cbrt(1 + (state[:, 3] ** 3 - b["outer"] ** 3) / b["radius"] ** 3)
+        rest = self.bubbles["radius"]
+        thick = np.cbrt(1 + (state[:, 3] ** 3 - self.bubbles["outer"] ** 3) / rest**3)
         return Shape(
             height_mm=1e3 * (state[:, 2] + state[:, 3]),
             position=state[:, :3].copy(),
-            stretch=np.where(b["thick"], stretch, state[:, 3] / b["radius"]),
+            stretch=np.where(self.bubbles["thick"], thick, state[:, 3] / rest),
             contacts=contacts,
             pressure=np.array(pressure),
             radius=state[:, 3].copy(),
@@ -298,7 +311,7 @@ def balloons_of(balloon: YeohBalloon | Sequence[YeohBalloon] | None, layout: Lay
     return balloons
 
 
-def _records(layout: Layout, balloons: Sequence[YeohBalloon]) -> NDArray[Any]:
+def _bubble_records(layout: Layout, balloons: Sequence[YeohBalloon]) -> NDArray[Any]:
     records: NDArray[Any] = np.zeros(len(layout), core.BUBBLE)
     records["x"], records["y"] = layout.positions_mm.T * 1e-3
     for record, balloon in zip(records, balloons, strict=True):

@@ -1,13 +1,16 @@
 """Down to the nearest equilibrium: Newton steps by conjugate gradients, within a trust region, compiled.
 
-Steihaug's method: conjugate gradients on H s = −g, preconditioned by each bubble's own 4 by 4 block, until the residual
-is small enough, the step leaves the trust region, or the curvature is negative: then the step follows that direction
-to the region's edge. So a saddle is left downhill, a step never raises the energy, and work is linear in contacts.
+Steihaug's method (1983): conjugate gradients on H s = −g, g the gradient and H the second derivatives of the energy,
+preconditioned by each bubble's own 4 by 4 block, until the residual is small enough, the step leaves the trust region, or
+the curvature is negative: then the step follows that direction to the region's edge. So a saddle is left downhill, a step
+never raises the energy, and work is linear in contacts. Names of one letter are the method's: s the step, d its direction,
+r the residual, z the preconditioned residual, E the energy.
 """
 
 import inspect
 import math
 import zlib
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,28 +22,32 @@ from bubbleskin.membrane import balloon, wall
 CONVERGED, STALLED, EXHAUSTED, BURST = range(4)
 """How a relaxation ends: force below tolerance; no step helps; too many steps; a bubble grows without end or closes."""
 
-_ROUNDING = 1e-14  # of the energy: below that, the forces decide whether a step is good
-_LARGEST, _SMALLEST = 10.0, 0.4  # stretches
+_ROUNDING = 1e-14  # Share of the energy: below that, the forces decide whether a step is good.
+_LARGEST, _SMALLEST = 10.0, 0.4  # Stretches of the outer radius between which the model is followed.
+_LEAST_TRUST = 1e-13  # m. No step that short helps any more.
+_IN_RANGE, _CLOSES, _GROWS = range(3)
+
+
+class Curvature(NamedTuple):
+    """H at one state, as `energy.curvature` prepares it: what a product H v needs, and its preconditioner."""
+
+    pairs: np.ndarray
+    """(m, 2)."""
+    blocks: np.ndarray
+    """(n, 4, 4): H of each bubble by itself."""
+    contacts: np.ndarray
+    """(m, 5)."""
+    inverses: np.ndarray
+    """(n, 4, 4): of the blocks' positive parts."""
 
 
 @njit
 def invert(blocks, inverses):  # type: ignore[no-untyped-def]
-    """Inverse of each block's positive part, by Cholesky with pivots held up."""
+    """Inverse of each block's positive part, (n, 4, 4) each, by Cholesky with pivots held up."""
     L = np.zeros((4, 4))
     y = np.zeros(4)
     for i in range(len(blocks)):
-        B = blocks[i]
-        floor = 1e-3 * max(abs(B[0, 0]), abs(B[1, 1]), abs(B[2, 2]), abs(B[3, 3]))
-        for a in range(4):
-            for b in range(a):
-                total = B[a, b]
-                for c in range(b):
-                    total -= L[a, c] * L[b, c]
-                L[a, b] = total / L[b, b]
-            total = B[a, a]
-            for c in range(a):
-                total -= L[a, c] * L[a, c]
-            L[a, a] = math.sqrt(max(total, floor))
+        _factorise(blocks[i], L)
         for column in range(4):
             for a in range(4):
                 total = 1.0 if a == column else 0.0
@@ -55,17 +62,33 @@ def invert(blocks, inverses):  # type: ignore[no-untyped-def]
 
 
 @njit
+def _factorise(block, L):  # type: ignore[no-untyped-def]
+    """Cholesky factor `L` of `block`, no pivot below a thousandth of the largest."""
+    floor = 1e-3 * max(abs(block[0, 0]), abs(block[1, 1]), abs(block[2, 2]), abs(block[3, 3]))
+    for a in range(4):
+        for b in range(a):
+            total = block[a, b]
+            for c in range(b):
+                total -= L[a, c] * L[b, c]
+            L[a, b] = total / L[b, b]
+        total = block[a, a]
+        for c in range(a):
+            total -= L[a, c] * L[a, c]
+        L[a, a] = math.sqrt(max(total, floor))
+
+
+@njit
 def precondition(inverses, r, z):  # type: ignore[no-untyped-def]
     """`z` = the inverted blocks times `r`, both (n, 4)."""
     for i in range(len(r)):
         for a in range(4):
-            M = inverses[i, a]
-            z[i, a] = M[0] * r[i, 0] + M[1] * r[i, 1] + M[2] * r[i, 2] + M[3] * r[i, 3]
+            row = inverses[i, a]
+            z[i, a] = row[0] * r[i, 0] + row[1] * r[i, 1] + row[2] * r[i, 2] + row[3] * r[i, 3]
 
 
 @njit
 def inner(a, b):  # type: ignore[no-untyped-def]
-    """Sum of a b."""
+    """Sum of a b, (n, 4) each."""
     total = 0.0
     for i in range(len(a)):
         for k in range(4):
@@ -75,7 +98,7 @@ def inner(a, b):  # type: ignore[no-untyped-def]
 
 @njit
 def to_edge(s, d, radius):  # type: ignore[no-untyped-def]
-    """The first τ ≥ 0 at which some bubble's part of s + τ d is `radius` long."""
+    """The first τ ≥ 0 at which some bubble's part of s + τ d is `radius` (m) long."""
     least = np.inf
     for i in range(len(s)):
         dd = sd = ss = 0.0
@@ -91,7 +114,7 @@ def to_edge(s, d, radius):  # type: ignore[no-untyped-def]
 
 @njit
 def each_to_edge(d, radius, s):  # type: ignore[no-untyped-def]
-    """`s` = `d` with each bubble's part cut to `radius`; False if that is all the same as `d`."""
+    """`s` = `d` with each bubble's part cut to `radius` (m); False if that is all the same as `d`."""
     cut = False
     for i in range(len(d)):
         size = math.sqrt(d[i, 0] ** 2 + d[i, 1] ** 2 + d[i, 2] ** 2 + d[i, 3] ** 2)
@@ -104,27 +127,28 @@ def each_to_edge(d, radius, s):  # type: ignore[no-untyped-def]
 
 
 @njit
-def newton_step(g, pairs, blocks, contacts, inverses, radius, accuracy, s, work):  # type: ignore[no-untyped-def]
-    """Fill `s` by Steihaug's method, each bubble's part no longer than `radius`.
+def newton_step(g, at, radius, accuracy, s, work):  # type: ignore[no-untyped-def]
+    """Fill `s`, (n, 4) m, by Steihaug's method, each bubble's part no longer than `radius` (m).
 
-    Returns the energy that it should save, whether it ends at the edge, and whether curvature was negative.
+    `g` is the gradient (N), `at` the `Curvature`, `accuracy` the share of the residual that may be left, `work` room of
+    (4, n, 4). Returns the energy (J) that it should save, whether it ends at the edge, and whether curvature was negative.
     """
     r, z, d, Hd = work[0], work[1], work[2], work[3]
     s[:] = 0.0
     r[:] = -g
-    precondition(inverses, r, z)
+    precondition(at.inverses, r, z)
     d[:] = z
     rz = inner(r, z)
     goal = accuracy * accuracy * inner(r, r)
     saved = 0.0
     for k in range(8 * len(g) + 20):
-        hessian(d, pairs, blocks, contacts, Hd)
+        hessian(d, at.pairs, at.blocks, at.contacts, Hd)
         dHd = inner(d, Hd)
         rd = inner(r, d)
         edge = to_edge(s, d, radius)
         if k == 0 and edge < 1.0 and each_to_edge(d, radius, s):
             # Far from equilibrium one bubble would hold up all others: each goes as far as it may on its own.
-            hessian(s, pairs, blocks, contacts, Hd)
+            hessian(s, at.pairs, at.blocks, at.contacts, Hd)
             saved = inner(r, s) - 0.5 * inner(s, Hd)
             if saved > 0.0:
                 return saved, True, dHd <= 0.0
@@ -141,128 +165,160 @@ def newton_step(g, pairs, blocks, contacts, inverses, radius, accuracy, s, work)
         saved += alpha * rd - 0.5 * alpha * alpha * dHd
         if inner(r, r) <= goal:
             break
-        precondition(inverses, r, z)
+        precondition(at.inverses, r, z)
         new = inner(r, z)
         d[:] = z + (new / rz) * d
         rz = new
     return saved, False, False
 
 
-def _compile(stamp: int):  # type: ignore[no-untyped-def]
-    """Compile what is called from Python; `stamp` stands for the files that numba's cache cannot see, as in `sim.kernel`."""
+@njit
+def _place(state, s, bubbles, trial):  # type: ignore[no-untyped-def]
+    """`trial` = `state` + `s`; whether its radii are in the model's range, or one closes or grows without end."""
+    trial[:] = state + s
+    closed = False
+    for i in range(len(state)):
+        bubble = bubbles[i]
+        if bubble.outer * _LARGEST < trial[i, 3]:
+            return _GROWS
+        # The base is hundreds of times stiffer than the neck, which the model of a step from above it cannot know:
+        # a bubble that falls through it in this step lands on it.
+        if state[i, 2] > state[i, 3] and trial[i, 2] < trial[i, 3]:
+            trial[i, 2] = trial[i, 3]
+        closed = closed or trial[i, 3] < _SMALLEST * bubble.outer
+        closed = closed or trial[i, 3] ** 3 < 1.001 * (bubble.outer**3 - bubble.inner**3)
+    return _CLOSES if closed else _IN_RANGE
 
-    @njit(cache=True)
-    def relax(state, pressure, bubbles, springs, pairs, radius, tolerance, limit, trace):  # type: ignore[no-untyped-def]
-        """Relax `state` in place at `pressure`; no step moves a bubble further than `radius` (m).
 
-        Returns how it ended, the largest force left (N), the steps taken, and whether curvature was ever negative.
-        `tolerance` is that force's goal, `limit` the most steps; `trace`, (limit + 1,), gets the energy after each.
-        """
-        _ = stamp
-        n, m = len(state), len(pairs)
-        g, trial, new_g, s = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
-        blocks, inverses, contacts = np.empty((n, 4, 4)), np.empty((n, 4, 4)), np.empty((m, 5))
-        work = np.empty((4, n, 4))
-        E = gradient(state, pressure, bubbles, springs, pairs, g)
-        trace[0] = E
-        force = np.abs(g).max()
-        trust = radius
-        first = max(force, tolerance)
-        unstable = fresh = False
-        steps = 0
-        while force > tolerance and steps < limit:
-            if not fresh:
-                curvature(state, pressure, bubbles, springs, pairs, blocks, contacts)
-                invert(blocks, inverses)
-                fresh = True
-            accuracy = min(0.1, math.sqrt(force / first))
-            saved, edge, negative = newton_step(g, pairs, blocks, contacts, inverses, trust, accuracy, s, work)
-            unstable = unstable or negative
-            trial[:] = state + s
-            steps += 1
-            closed = False
-            for i in range(n):
-                if bubbles[i].outer * _LARGEST < trial[i, 3]:
-                    trace[steps:] = E
-                    return BURST, force, steps, unstable
-                # The base is hundreds of times stiffer than the neck, which the model of a step from above it cannot know:
-                # who falls through it in this step lands on it.
-                if state[i, 2] > state[i, 3] and trial[i, 2] < trial[i, 3]:
-                    trial[i, 2] = trial[i, 3]
-                closed = closed or trial[i, 3] < _SMALLEST * bubbles[i].outer
-                closed = closed or trial[i, 3] ** 3 < 1.001 * (bubbles[i].outer ** 3 - bubbles[i].inner ** 3)
-            if closed:
-                trust *= 0.25
-                trace[steps] = E
-                if trust < 1e-12:
-                    trace[steps:] = E
-                    return BURST, force, steps, unstable
-                continue
+@njit
+def _merit(E, new_E, saved, force, new_force):  # type: ignore[no-untyped-def]
+    """Energy saved by a step as a share of what it should save; where rounding hides that, 1 if the force fell, else −1."""
+    small = _ROUNDING * (abs(E) + 1e-6)
+    if saved <= small:
+        return 1.0 if new_force < force and new_E <= E + small else -1.0
+    return (E - new_E) / max(saved, small)
+
+
+@njit
+def _relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace):  # type: ignore[no-untyped-def]
+    n, m, limit = len(state), len(pairs), len(trace) - 1
+    g, trial, new_g, s = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
+    at = Curvature(pairs, np.empty((n, 4, 4)), np.empty((m, 5)), np.empty((n, 4, 4)))
+    work = np.empty((4, n, 4))
+    E = gradient(state, pressure, bubbles, springs, pairs, g)
+    trace[0] = E
+    force = np.abs(g).max()
+    first, trust = max(force, tolerance), radius
+    ended, unstable, fresh, steps = EXHAUSTED, False, False, 0
+    while force > tolerance and steps < limit:
+        if not fresh:
+            curvature(state, pressure, bubbles, springs, pairs, at.blocks, at.contacts)
+            invert(at.blocks, at.inverses)
+            fresh = True
+        accuracy = min(0.1, math.sqrt(force / first))
+        saved, edge, negative = newton_step(g, at, trust, accuracy, s, work)
+        unstable = unstable or negative
+        steps += 1
+        place = _place(state, s, bubbles, trial)
+        ratio = -1.0
+        if place == _IN_RANGE:
             new_E = gradient(trial, pressure, bubbles, springs, pairs, new_g)
             new_force = np.abs(new_g).max()
-            small = _ROUNDING * (abs(E) + 1e-6)
-            ratio = (E - new_E) / max(saved, small)
-            if saved <= small:
-                ratio = 1.0 if new_force < force and new_E <= E + small else -1.0
+            ratio = _merit(E, new_E, saved, force, new_force)
             if ratio > 0.0 and (ratio > 1e-4 or new_force < force):
                 state[:] = trial
                 g[:] = new_g
                 E, force, fresh = new_E, new_force, False
-            trace[steps] = E
-            if ratio < 0.1:
-                trust *= 0.25
-                if trust < 1e-13:
-                    trace[steps:] = E
-                    return STALLED, force, steps, unstable
-            elif ratio > 0.75 and edge:
-                trust = min(2.0 * trust, radius)
-        trace[steps:] = E
-        return CONVERGED if force <= tolerance else EXHAUSTED, force, steps, unstable
+        trace[steps] = E
+        trust = _next_trust(trust, ratio, edge, radius)
+        if place == _GROWS or trust < _LEAST_TRUST:
+            ended = STALLED if place == _IN_RANGE else BURST
+            break
+    trace[steps:] = E
+    return CONVERGED if force <= tolerance else ended, force, steps, unstable
+
+
+@njit
+def _next_trust(trust, ratio, edge, radius):  # type: ignore[no-untyped-def]
+    """The trust region's radius (m) after a step that saved `ratio` of what it should."""
+    if ratio < 0.1:
+        return 0.25 * trust
+    if ratio > 0.75 and edge:
+        return min(2.0 * trust, radius)
+    return trust
+
+
+@njit
+def _solve(state, pressure, bubbles, springs, pairs, rhs, out, accuracy):  # type: ignore[no-untyped-def]
+    n, m = len(state), len(pairs)
+    at = Curvature(pairs, np.empty((n, 4, 4)), np.empty((m, 5)), np.empty((n, 4, 4)))
+    work = np.empty((4, n, 4))
+    curvature(state, pressure, bubbles, springs, pairs, at.blocks, at.contacts)
+    invert(at.blocks, at.inverses)
+    good = True
+    for k in range(len(rhs)):
+        _, edge, _ = newton_step(-rhs[k], at, np.inf, accuracy, out[k], work)
+        good = good and not edge
+    return good
+
+
+@njit
+def _extent(state, last, bubbles):  # type: ignore[no-untyped-def]
+    radius = aside = moved = 0.0
+    for i in range(len(state)):
+        radius = max(radius, state[i, 3])
+        aside = max(aside, (state[i, 0] - bubbles[i].x) ** 2 + (state[i, 1] - bubbles[i].y) ** 2)
+        distance = 0.0
+        for k in range(4):
+            distance += (state[i, k] - last[i, k]) ** 2
+        moved = max(moved, distance)
+    return radius, math.sqrt(aside), math.sqrt(moved)
+
+
+def _entries(stamp: int):  # type: ignore[no-untyped-def]
+    """What is called from Python, compiled and cached on disk.
+
+    numba's cache looks at this file and at what a function closes over, not at the other files that it calls into.
+    `stamp` stands for those: without it an edited formula would go on running as it was.
+    """
+
+    @njit(cache=True)
+    def relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace):  # type: ignore[no-untyped-def]
+        """Relax `state`, (n, 4) m, in place at `pressure`, (n,) Pa; no step moves a bubble further than `radius` (m).
+
+        `tolerance` (N) is the goal of the largest force; `trace`, (k + 1,), gets the energy (J) after each of at most k
+        steps. Returns how it ended, the largest force left (N), the steps taken, and whether curvature was ever negative.
+        """
+        _ = stamp
+        return _relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace)
 
     @njit(cache=True)
     def solve(state, pressure, bubbles, springs, pairs, rhs, out, accuracy):  # type: ignore[no-untyped-def]
         """`out` = H⁻¹ rhs for k right-hand sides, both (k, n, 4), at a stable equilibrium; False if it is none."""
         _ = stamp
-        n, m = len(state), len(pairs)
-        blocks, inverses, contacts = np.empty((n, 4, 4)), np.empty((n, 4, 4)), np.empty((m, 5))
-        work = np.empty((4, n, 4))
-        curvature(state, pressure, bubbles, springs, pairs, blocks, contacts)
-        invert(blocks, inverses)
-        good = True
-        for k in range(len(rhs)):
-            _, edge, _ = newton_step(-rhs[k], pairs, blocks, contacts, inverses, np.inf, accuracy, out[k], work)
-            good = good and not edge
-        return good
+        return _solve(state, pressure, bubbles, springs, pairs, rhs, out, accuracy)
 
     @njit(cache=True)
     def evaluate(state, pressure, bubbles, springs, pairs, out):  # type: ignore[no-untyped-def]
-        """`energy.gradient`, cached."""
+        """`energy.gradient`."""
         _ = stamp
         return gradient(state, pressure, bubbles, springs, pairs, out)
 
     @njit(cache=True)
     def hold(radius, bubbles, out):  # type: ignore[no-untyped-def]
-        """Pressure (Pa) that holds each free bubble at outer `radius`, (n,)."""
+        """Pressure `out` (Pa) that holds each free bubble at outer `radius` (m), (n,) each."""
         _ = stamp
         for i in range(len(radius)):
             out[i] = membrane(radius[i], bubbles[i])[1]
 
     @njit(cache=True)
     def extent(state, last, bubbles):  # type: ignore[no-untyped-def]
-        """The largest radius, the furthest aside of a barb, and the furthest that any bubble is from where it was `last`."""
+        """The largest radius, the furthest aside of a barb, and the furthest that any bubble is from where it was `last`: m."""
         _ = stamp
-        radius = aside = moved = 0.0
-        for i in range(len(state)):
-            radius = max(radius, state[i, 3])
-            aside = max(aside, (state[i, 0] - bubbles[i].x) ** 2 + (state[i, 1] - bubbles[i].y) ** 2)
-            distance = 0.0
-            for k in range(4):
-                distance += (state[i, k] - last[i, k]) ** 2
-            moved = max(moved, distance)
-        return radius, math.sqrt(aside), math.sqrt(moved)
+        return _extent(state, last, bubbles)
 
     return relax, solve, evaluate, hold, extent
 
 
 _FILES = (balloon, wall, energy)
-relax, solve, evaluate, hold, extent = _compile(zlib.crc32("".join(map(inspect.getsource, _FILES)).encode()))
+relax, solve, evaluate, hold, extent = _entries(zlib.crc32("".join(map(inspect.getsource, _FILES)).encode()))

@@ -6,12 +6,13 @@ import shutil
 import string
 import sys
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
-from bubbleskin.link.transport import SerialTransport, attached
+from bubbleskin.link.transport import SerialTransport, Transport, attached
 
 INFO = "INFO_UF2.TXT"
 """The file by which a boot loader's drive is known."""
@@ -19,71 +20,72 @@ INFO = "INFO_UF2.TXT"
 _LABEL = Path("/dev/disk/by-label/RPI-RP2")
 
 
-class Connection(Protocol):
-    """A `bubbleskin.link.transport.Transport` that also hands out the port under it, as pyserial has them."""
-
-    name: str
-    blocks: bool
+class Connection(Transport):
+    """A `Transport` that also hands out the port under it, as pyserial has them."""
 
     @property
+    @abstractmethod
     def port(self) -> Any:
         """What `mpremote` reads and writes: `read`, `write`, `inWaiting`."""
 
-    def read(self, timeout: float) -> bytes:
-        """As of `Transport`."""
 
-    def write(self, data: bytes) -> None:
-        """As of `Transport`."""
-
-    def now(self) -> float:
-        """As of `Transport`."""
-
-    def close(self) -> None:
-        """As of `Transport`."""
+class SerialConnection(SerialTransport, Connection):
+    """A serial port of this computer."""
 
 
-class Sink(Protocol):
+class Sink(ABC):
     """A file being written, block by block to the drive itself, not to a cache."""
 
+    @abstractmethod
     def write(self, data: bytes) -> None:
         """Write and wait until it is there; `OSError` where it cannot be."""
 
-    def __enter__(self) -> Self: ...
+    def __enter__(self) -> Self:
+        return self
 
+    @abstractmethod
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
 
 
-class Machine(Protocol):
+class Machine(ABC):
     """What flashing needs of a computer."""
 
+    @abstractmethod
     def ports(self) -> list[str]:
         """Serial ports of boards that run MicroPython, by USB id."""
 
+    @abstractmethod
     def drives(self) -> list[Path]:
         """Drives of boot loaders, of whatever chip."""
 
+    @abstractmethod
     def unmounted(self) -> Path | None:
         """A boot loader's drive that is there and not mounted."""
 
+    @abstractmethod
     def open(self, port: str) -> Connection:
         """Open a port; `LinkError` where that cannot be done."""
 
+    @abstractmethod
     def free(self, drive: Path) -> int:
         """Bytes that are free on a drive."""
 
+    @abstractmethod
     def create(self, path: Path) -> Sink:
         """Begin to write a file."""
 
+    @abstractmethod
     def now(self) -> float:
-        """Seconds."""
+        """Seconds on the clock of `sleep`."""
 
+    @abstractmethod
     def sleep(self, seconds: float) -> None:
-        """Let time pass."""
+        """Let `seconds` pass."""
 
 
-class ThisMachine:
+class ThisMachine(Machine):
     """The computer that this program runs on."""
 
     def ports(self) -> list[str]:
@@ -100,7 +102,7 @@ class ThisMachine:
 
     def open(self, port: str) -> Connection:
         """Open a port; `LinkError` where that cannot be done."""
-        return SerialTransport(port)
+        return SerialConnection(port)
 
     def free(self, drive: Path) -> int:
         """Bytes that are free on a drive."""
@@ -119,7 +121,7 @@ class ThisMachine:
         time.sleep(seconds)
 
 
-class _SyncedFile:
+class _SyncedFile(Sink):
     def __init__(self, path: Path):
         self._file = path.open("wb", buffering=0)
 
@@ -128,9 +130,6 @@ class _SyncedFile:
         while view:
             view = view[self._file.write(view) or 0 :]
         os.fsync(self._file.fileno())
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -299,7 +299,7 @@ class Link:
         self.service(now)
         if self._pings.waiting:
             run_sync(self.wait(now + _SLICE, lambda: not self._pings.waiting))
-        run_sync(self.wait(now + max(0.001, getattr(self.transport, "behind", 0.0))))
+        run_sync(self.wait(now + max(0.001, self.transport.behind)))
 
     def next_beat(self) -> float:
         """Seconds until `tend` is wanted."""
@@ -363,13 +363,13 @@ class Link:
 
     def _lose(self, problem: LinkError) -> None:
         """The port has gone. A session that was open may go on when it comes back."""
-        if self.closed or self._boot_id is None or not hasattr(self.transport, "reopen"):
+        if self.closed or self._boot_id is None or not self.transport.reopens:
             raise problem
         self._gone = problem
 
     def _reopen(self, now: float) -> bool:
         try:
-            self.transport.reopen()  # type: ignore[attr-defined]
+            self.transport.reopen()
         except LinkError:
             return False
         self._gone = None

@@ -6,8 +6,9 @@ import os
 import select
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import serial
 from serial.tools import list_ports
@@ -22,30 +23,48 @@ _POLL = 0.01
 _PATIENCE = 0.02
 
 
-class Transport(Protocol):
-    """What the link needs of a way to a device."""
+class Transport(ABC):
+    """A way to a device: what the link needs of one.
+
+    `name`: what sentences call it, such as a port or a URL. `blocks`: whether `read` waits by the wall clock; otherwise
+    it returns as soon as a simulation has been stepped. `reopens`: whether `reopen` can bring it back after it has gone.
+    """
 
     name: str
     blocks: bool
-    """Whether `read` waits by the wall's clock; otherwise it returns as soon as a simulation has been stepped."""
+    reopens: bool = False
 
+    @abstractmethod
     def read(self, timeout: float) -> bytes:
         """Wait up to `timeout` seconds of this transport's own clock for bytes; none when none came."""
 
+    @abstractmethod
     def write(self, data: bytes) -> None:
         """Send all of `data`."""
 
+    @abstractmethod
     def now(self) -> float:
-        """Seconds on the clock of `read`'s timeout: the wall's, or a simulation's virtual one."""
+        """Seconds on the clock of `read`'s timeout: the wall clock, or a simulation's virtual one."""
 
+    @abstractmethod
     def close(self) -> None:
         """Let go of the device."""
 
+    @property
+    def behind(self) -> float:
+        """Seconds of `now` that reading has to catch up with, because nobody has read for a while."""
+        return 0.0
 
-class SerialTransport:
+    def reopen(self) -> None:
+        """Open it again after it has gone; `LinkError` where that cannot be, or not yet."""
+        raise LinkError(f"The connection to {self.name} is lost; connect again.")
+
+
+class SerialTransport(Transport):
     """A serial port, or anything that pyserial opens: /dev/ttyACM0, COM3, socket://…, rfc2217://…"""
 
     blocks = True
+    reopens = True
 
     def __init__(self, url: str):
         self.name = url

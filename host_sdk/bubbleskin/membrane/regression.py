@@ -23,7 +23,7 @@ HUBER = 1.345  # standard deviations; these two give 95 % efficiency on clean Ga
 BISQUARE = 4.685
 LOST = 6e-5  # of good points are taken for outliers: with many points those beyond 4 standard deviations
 PASSES = 60
-TOLERANCE = 1e-7  # relative change of θ at which the passes end
+LEAST_CHANGE = 1e-7  # Relative, of θ: a smaller one ends the passes.
 
 _UNIT = np.eye(3)[:, :, None]  # θ = (1,0,0), (0,1,0), (0,0,1), to broadcast over points
 
@@ -223,7 +223,7 @@ def regress(shape: Shape, points: Points, *, robust: bool) -> Solution:
             new = solve_bounded(linear, weights)
             change = float(np.max(np.abs(new - theta) / (np.abs(new) + 1e-6 * new[0])))
             theta = new
-            if change < (TOLERANCE if stage in ("plain", "trim") else 1e-3):
+            if change < (LEAST_CHANGE if stage in ("plain", "trim") else 1e-3):
                 break
     eta = project(shape, points, theta, eta)
     linear = linearise(shape, points, theta, eta)

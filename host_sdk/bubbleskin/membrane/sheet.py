@@ -31,6 +31,7 @@ from bubbleskin.membrane.fit import (
     open_constants,
 )
 from bubbleskin.membrane.regression import (
+    PASSES,
     Linear,
     Points,
     Shape,
@@ -57,8 +58,6 @@ MEAN_SPREAD = 1.0
 
 STATED = 6.0
 """The stated noise counts as much as this many points do."""
-
-PASSES = 60
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ class TableError(NamedTuple):
 class Table:
     """Knots (height in µm, gauge pressure in Pa), heights strictly increasing, at most 64 of them.
 
-    Pressures between knots are :meth:`pressure_at`'s, to the last bit the same on host and firmware.
+    Pressures between knots are :meth:`pressure_at`'s.
     ``balloon`` is the one the table was built from, if it was; it takes no part in comparisons.
     """
 

@@ -112,15 +112,18 @@ def thick_pressure(
     """
     A, B = rest_radii(h0, r0, wall, surface)
     a, b = current_radii(x, h0, r0, wall, surface)
-    return _antiderivative(a / A, mu, c2, c3) - _antiderivative(b / B, mu, c2, c3)
+    return pressure_antiderivative(a / A, mu, c2, c3) - pressure_antiderivative(b / B, mu, c2, c3)
 
 
 def _integrand(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
     return 4 * energy_slope(x, mu, c2, c3) * (x**-2 + x**-5)
 
 
-def _antiderivative(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
-    # ∫ (I−3)^k (λ⁻² + λ⁻⁵) dλ for k = 0, 1, 2, term by term; tests differentiate it with sympy.
+def pressure_antiderivative(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
+    """∫ 4 dW/dI (λ⁻² + λ⁻⁵) dλ (Pa) at stretch ``x``, which has no thickness in it: see :func:`thick_pressure`.
+
+    Term by term: ∫ (I − 3)^k (λ⁻² + λ⁻⁵) dλ for k = 0, 1, 2. Tests differentiate it with sympy.
+    """
     y = 1 / x
     y2, y3 = y * y, y * y * y
     y4 = y2 * y2

@@ -19,7 +19,7 @@ from bubbleskin.layout import Layout
 from bubbleskin.plot.membrane import COLOURS, STYLE
 
 if TYPE_CHECKING:
-    from bubbleskin.planner.search import Plan
+    from bubbleskin.planner.plan import Plan
 
 
 class Bubbles(Protocol):

@@ -26,14 +26,14 @@ DRAG = 0.05
 """What slows a centre down, N·s/m: it follows its springs within milliseconds, much faster than air flows. Small
 enough not to show, large enough for steps of 50 µs: h k < 2 DRAG even where six neighbours push (1800 N/m)."""
 
-# All 0 when healthy; `Plant.inject` says what they mean.
-FAULTS = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sensor_absent", "sensor_bias")
+FAILURES = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sensor_absent", "sensor_bias")
+"""What can be made to fail, all 0 when healthy; `Plant.inject` says what the values mean."""
 
 STATE = np.dtype(
     [(name, "f8") for name in ("stretch", "pressure", "node")]
     + [(f"{valve}_{name}", "?") for valve in ("fill", "vent") for name in ("energised", "open")]
     + [(f"{valve}_{name}", "f8") for valve in ("fill", "vent") for name in ("since", "start", "stop")]
-    + [(name, "f8") for name in FAULTS],
+    + [(name, "f8") for name in FAILURES],
     align=True,
 )
 AIR = np.dtype([(name, "f8") for name in ("pressure", "pumped", "vented")])

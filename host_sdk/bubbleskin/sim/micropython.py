@@ -13,7 +13,7 @@ import bubble_firmware
 import bubble_protocol
 from bubble_firmware.hal.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
 from bubbleskin.errors import LinkError
-from bubbleskin.sim.board import Outputs
+from bubbleskin.sim.firmware import Firmware, Outputs
 from bubbleskin.toolchain.interpreter import find_micropython
 
 HEAP = "448k"
@@ -36,7 +36,7 @@ def source_path() -> list[str]:
     return [str(Path(package.__path__[0]).parent) for package in (bubble_protocol, bubble_firmware)]
 
 
-class MicroPythonFirmware:
+class MicroPythonFirmware(Firmware):
     """A `Firmware` in another process, talked to through `bubble_firmware.hal.lockstep`."""
 
     def __init__(self, board: ModuleType, boot_id: int):

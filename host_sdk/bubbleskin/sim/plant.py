@@ -72,7 +72,7 @@ class Plant:
         self._noise = np.zeros(n)
         self._rng = np.random.default_rng(seed)
         self._place = np.zeros((n if contact else 0, 4))
-        """Centre x, y, z and radius of each bubble, m: the state of `shape.energy`. No rows without contact."""
+        """Centre x, y, z and radius of each bubble, m: the state of `contact.energy`. No rows without contact."""
         self._force = np.zeros_like(self._place)
         self._necks, self._springs = np.zeros(len(self._place), BUBBLE), np.zeros(1, SPRINGS)
         self._pairs = np.zeros((0, 2), np.int64)
@@ -139,8 +139,8 @@ class Plant:
         noise = supply.sensor_noise * self._rng.standard_normal()
         return sensor_counts(self.supply_pa + supply.sensor_offset, noise, SUPPLY_PA_PER_COUNT)
 
-    def inject(self, name: str, bubble: int, value: float) -> None:
-        """Give `bubble` a fault; 0 takes it away again.
+    def inject(self, fault: str, bubble: int, value: float = 1.0) -> None:
+        """Make something of `bubble` fail; a value of 0 mends it. `fault` and what its value means:
 
         `leak`: RTṁ per Pa gauge, m³/s; 5e-8 takes 1 % of a full bubble's air a second.
         `pop_off`: share of the line's bore that is open, 1 for a bubble that has slipped off its barb.
@@ -148,9 +148,9 @@ class Plant:
         `sensor_stuck`: the count that it sticks at. `sensor_bias`: Pa added to what it sees.
         `sensor_absent`: 1 for a converter input that reads its pull-down, 0 counts.
         """
-        if name not in kernel.FAULTS:
-            raise InvalidInput(f"no fault is called {name!r}; choose one of {', '.join(kernel.FAULTS)}")
-        self._state[name][bubble] = value
+        if fault not in kernel.FAILURES:
+            raise InvalidInput(f"no failure is called {fault!r}; choose one of {', '.join(kernel.FAILURES)}")
+        self._state[fault][bubble] = value
 
     def rest_at(self, height_mm: ArrayLike) -> None:
         """Put every bubble at rest at `height_mm`, one for all or (n,): valves shut, line at its pressure."""
@@ -163,7 +163,7 @@ class Plant:
         self._stand()
 
     def snapshot(self) -> tuple[Any, ...]:
-        """Copy everything that changes, faults and noise generator included, for `restore`."""
+        """Copy everything that changes, failures and noise generator included, for `restore`."""
         return self._state.copy(), self._air.copy(), self._place.copy(), self.time, self._rng.bit_generator.state
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
@@ -216,5 +216,5 @@ class Plant:
 
     @property
     def vented(self) -> float:
-        """Air lost since the start through vents, dump valve and faults, pV in J."""
+        """Air lost since the start through vents, dump valve and failures, pV in J."""
         return float(self._air["vented"][0])

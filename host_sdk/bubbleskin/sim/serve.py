@@ -4,15 +4,36 @@ import contextlib
 import os
 import select
 import socket
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 
 from bubbleskin.errors import InvalidInput, LinkError
-from bubbleskin.sim.transport import Board, Pace
+from bubbleskin.sim.board import Simulated
+from bubbleskin.sim.pacing import Pace
 
-_OUT_MAX = 65536  # bytes kept for a program that does not read; older ones are dropped, as a full USB buffer does
+_OUT_MAX = 65536
+"""Bytes kept for a program that does not read; older ones are dropped, as a full USB buffer does."""
 
 
-class PtyEnd:
+class End(ABC):
+    """The place at which another program finds the board. `name` is the port or URL that it opens."""
+
+    name: str
+
+    @abstractmethod
+    def wait(self, seconds: float) -> bytes:
+        """Bytes for the board, at the latest after `seconds`."""
+
+    @abstractmethod
+    def write(self, data: bytes) -> int:
+        """Hand over what fits; returns how many bytes."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give the place back."""
+
+
+class PtyEnd(End):
     """A pseudo-terminal; `name` is the port that another program opens."""
 
     def __init__(self) -> None:
@@ -32,7 +53,7 @@ class PtyEnd:
         return os.read(self._own, 4096) if ready else b""
 
     def write(self, data: bytes) -> int:
-        """Hand over what fits; returns how much."""
+        """Hand over what fits; returns how many bytes."""
         try:
             return os.write(self._own, data)
         except BlockingIOError:
@@ -44,7 +65,7 @@ class PtyEnd:
         os.close(self._other)
 
 
-class TcpEnd:
+class TcpEnd(End):
     """A TCP port of this machine, for one program at a time; `name` is the URL that it opens."""
 
     def __init__(self, port: int):
@@ -81,7 +102,7 @@ class TcpEnd:
         return b""
 
     def write(self, data: bytes) -> int:
-        """Hand over what fits; returns how much. Without a client, everything is dropped."""
+        """Hand over what fits; returns how many bytes. Without a client, everything is dropped."""
         if self._client is None:
             return len(data)
         try:
@@ -103,17 +124,17 @@ class TcpEnd:
         self._client = None
 
 
-def serve(board: Board, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lambda: True) -> Iterator[Board]:
+def serve(board: Simulated, end: End, running: Callable[[], bool] = lambda: True) -> Iterator[Simulated]:
     """Run `board` at the wall clock's pace behind `end` for as long as `running()`; yields the board after every tick."""
     pace = Pace(board)
     out = bytearray()
     tick_us = round(board.tick_s * 1e6)
     while running():
-        while (ahead := -pace.owed()) > 0:
+        while (ahead := -pace.behind()) > 0:
             data = end.wait(ahead)
             if data:
                 board.to_device += data
-                phase = tick_us + round(pace.owed() * 1e6)
+                phase = tick_us + round(pace.behind() * 1e6)
                 board.listen(min(max(phase, 0), tick_us))
                 _hand_over(board, end, out)
         board.to_device += end.wait(0)
@@ -122,7 +143,7 @@ def serve(board: Board, end: PtyEnd | TcpEnd, running: Callable[[], bool] = lamb
         yield board
 
 
-def _hand_over(board: Board, end: PtyEnd | TcpEnd, out: bytearray) -> None:
+def _hand_over(board: Simulated, end: End, out: bytearray) -> None:
     """What the board sends, and what `out` still has of it, as far as it fits."""
     out += board.from_device
     board.from_device.clear()

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 
+from bubbleskin.sim.rp2040.bus import I2cChip
+
 _MEASURE = 0xAA
 _POWERED, _BUSY = 0x40, 0x20  # of the status byte
 _CONVERSION_NANOS = 5e6
 _LOW, _HIGH = 0.1, 0.9  # transfer function A: share of 2^24 counts at either end of the range
 
 
-class Abp2:
+class Abp2(I2cChip):
     """A sensor at `address` for `low` to `high` Pa gauge; `pressure()` is what it is exposed to, `now()` ns.
 
     0xAA 0x00 0x00 starts a conversion, which takes 5 ms. A read gives the status, three bytes of pressure and

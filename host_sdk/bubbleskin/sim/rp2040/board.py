@@ -1,34 +1,33 @@
 """A simulated wristband whose firmware is the real UF2, on an emulated RP2040 with the board's chips around it."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.errors import InvalidInput, LinkError
-from bubbleskin.sim.board import load_board, make_plant
+from bubbleskin.errors import LinkError
+from bubbleskin.sim.board import Simulated
+from bubbleskin.sim.rp2040.banks import Bank, Pca9685Bank, PwmBank
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import Chip
-from bubbleskin.sim.rp2040.expanders import Pca9685Bank
 from bubbleskin.sim.rp2040.mcp3208 import Mcp3208
 from bubbleskin.sim.rp2040.valves import FILL, VENT, Valves
 
-_BOOT_S = 5.0  # emulated; it takes a fifth of a second
+_BOOT_S = 5.0
+"""Emulated seconds within which it must appear on USB; it takes a fifth of one."""
 _PUMP_SLICE = 7
 
-# Faults of the board, beside those of `Plant.inject`. `number` counts the chips of a kind.
-FAULTS = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
+FAILURES = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
+"""What can be made to fail beside what `Plant.inject` knows."""
 
 
-class Rp2040Board:
-    """The board `name`, running the UF2 at `firmware`; the names of `SimulatedBoard` mean the same here.
+class Rp2040Board(Simulated):
+    """The board `name`, running the UF2 at `firmware`, in emulated time.
 
-    Time is emulated time. `seed`, `spread` and `contact` are those of `SimulatedBoard`. `absent`: chips that are not
-    soldered in, such as "converter0" or "driver2".
+    `seed`, `spread` and `contact` are those of `SimulatedBoard`. `absent`: chips that are not soldered in, such as
+    "converter0" or "driver2".
     """
 
     def __init__(
@@ -41,20 +40,10 @@ class Rp2040Board:
         contact: bool = True,
         absent: tuple[str, ...] = (),
     ):
-        self.data = load_board(name)
-        if not (math.isfinite(spread) and 0 <= spread <= 0.5):
-            raise InvalidInput(f"spread is {spread}; give a share from 0 to 0.5, such as 0.1 for ± 10 %.")
-        if seed < 0:
-            raise InvalidInput(f"seed is {seed}; give a whole number from 0.")
-        n = self.data.BUBBLES
-        self.name = name
-        self.tick_s: float = self.data.TICK_US * 1e-6
-        self.plant = make_plant(name, n, seed, spread, contact)
+        super().__init__(name, seed=seed, spread=spread, contact=contact)
         self.chip = Chip(firmware)
-        self.to_device = bytearray()
         self.from_device = self.chip.from_device
         self._supply_lost = False
-        self._owed = 0.0
         self._valves = Valves(self.plant, lambda: self.chip.time, self._pump_duty)
         self._solder(self.data, absent)
 
@@ -74,9 +63,9 @@ class Rp2040Board:
         self._disabled = True
         chip.on_pin(data.PIN_DISABLE, self._disable)
         if data.VALVES == "pwm":
-            self._bank: Any = PwmBank(self, data)
+            self._bank: Bank = PwmBank(chip, data, self._drive)
         else:
-            self._bank = Pca9685Bank(chip, data, self.drive, absent)
+            self._bank = Pca9685Bank(chip, data, self._drive, absent)
         chip.on_pin(data.PIN_DUMP, lambda level: self._valves.dump(level is True or self._supply_lost))
         chip.mcu.gpio[data.PIN_ESTOP].set_input_value(False)  # the loop through the button, unbroken
         convert = chip.mcu.adc.on_adc_read
@@ -103,7 +92,8 @@ class Rp2040Board:
         disabled = level is not False  # pulled up
         if disabled != self._disabled:
             self._disabled = disabled
-            self.refresh()
+            for bubble in range(self.data.BUBBLES):
+                self._drive(bubble)
 
     def _pump_duty(self) -> float:
         carrier = self.chip.mcu.pwm.channels[_PUMP_SLICE]
@@ -111,12 +101,7 @@ class Rp2040Board:
             return 0.0
         return min((carrier.cc & 0xFFFF) / (carrier.top + 1), 1.0)
 
-    def refresh(self) -> None:
-        """Bring the valves in line with what drives them."""
-        for bubble in range(self.data.BUBBLES):
-            self.drive(bubble)
-
-    def drive(self, bubble: int) -> None:
+    def _drive(self, bubble: int) -> None:
         """Bring the valves of one bubble in line with what drives them: without current fill is shut and vent open."""
         fill, vent = (False, False) if self._disabled else self._bank.coils(bubble)
         self._valves.set(bubble, VENT, not vent)
@@ -148,13 +133,6 @@ class Rp2040Board:
             if self.time > _BOOT_S:
                 raise LinkError(f"The emulated board has not appeared on USB within {_BOOT_S:g} emulated seconds.")
 
-    def step(self, dt: float) -> None:
-        """Let `dt` emulated seconds pass, in whole ticks; what is left over comes with the next step."""
-        self._owed += dt
-        while self._owed > self.tick_s * (1 - 1e-9):
-            self._owed -= self.tick_s
-            self.tick()
-
     def tick(self) -> None:
         """Let as much time pass as one period takes; periods themselves are the chip's affair."""
         if self.to_device:
@@ -167,7 +145,7 @@ class Rp2040Board:
         """Nothing: the chip looks at its link when it likes."""
 
     def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
-        """Give the board a fault, as of `Plant.inject` or one of `FAULTS`; a value of 0 takes it away.
+        """Make something fail, as of `Plant.inject` or one of `FAILURES`; a value of 0 mends it.
 
         `converter_silent`, `driver_silent`: chip `number` answers no more. `supply_lost`: the pump stands still
         and the reservoir empties. `estop`: the button is pressed. `hang`: the program is stuck from now on.
@@ -190,32 +168,3 @@ class Rp2040Board:
 
     def close(self) -> None:
         """Nothing to end: the emulator runs only when it is stepped."""
-
-
-class PwmBank:
-    """Fourteen coils on the RP2040's own PWM pins: fill of bubble i on GPIO 2i, its vent on 2i + 1."""
-
-    drivers: tuple[()] = ()
-
-    def __init__(self, board: Rp2040Board, data: ModuleType):
-        self._board = board
-        self._levels = [False] * (2 * data.BUBBLES)
-        self._channels = board.chip.mcu.pwm.channels
-        for pin in range(2 * data.BUBBLES):
-            board.chip.on_pin(pin, self._watch(pin))
-
-    def _watch(self, pin: int) -> Callable[[bool | None], None]:
-        def changed(level: bool | None) -> None:
-            self._levels[pin] = level is True  # pulled down
-            self._board.drive(pin // 2)
-
-        return changed
-
-    def coils(self, bubble: int) -> tuple[bool, bool]:
-        """Which coils have current, fill and vent."""
-        return self._levels[2 * bubble], self._levels[2 * bubble + 1]
-
-    def pulses(self) -> NDArray[np.float64]:
-        """Seconds of the compare registers in force, (n, 2): fill has current for so long, vent has none."""
-        n = len(self._levels) // 2
-        return np.array([[c.alarm_a.target, c.alarm_b.target] for c in self._channels[:n]]) * 1e-6

@@ -1,18 +1,24 @@
 """SPI and I2C of the emulated chip, with chips at the other end. Every byte takes the time its bits take."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 _NANOS = 1e9
-_SPI_GAP = 1.5  # bit times between two words: the PL022 lifts its own select between them in mode 0
+_SPI_GAP = 1.5
+"""Bit times between two words: the PL022 lifts its own select between them in mode 0."""
+_IC_FS_SPKLEN = 0xA0
+"""Register with the length of spikes that are suppressed, in clocks: RP2040 datasheet, 4.3.17."""
 
 
-class SpiChip(Protocol):
+class SpiChip(ABC):
     """A chip behind a chip select."""
 
+    @abstractmethod
     def select(self, selected: bool) -> None:
         """Chip select has gone low, or high again."""
 
+    @abstractmethod
     def transfer(self, byte: int) -> int:
         """The byte that it sends while it receives `byte`."""
 
@@ -51,18 +57,22 @@ class SpiBus:
         self._spi.complete_transmit(answer)
 
 
-class I2cChip(Protocol):
+class I2cChip(ABC):
     """A chip on an I2C bus. It does not acknowledge by returning False."""
 
+    @abstractmethod
     def start(self, address: int, read: bool) -> bool:
         """The bus has addressed `address`; whether this chip takes part."""
 
+    @abstractmethod
     def write(self, byte: int) -> bool:
         """Take a byte; whether it is acknowledged."""
 
+    @abstractmethod
     def read(self) -> int:
         """The next byte."""
 
+    @abstractmethod
     def stop(self) -> None:
         """The transfer is over."""
 
@@ -89,7 +99,7 @@ class I2cBus:
     def _after(self, bits: float, then: Callable[[], None]) -> None:
         i2c = self._i2c
         # The bit of the DW_apb_i2c: RP2040 datasheet, 4.3.14.1.
-        clocks = i2c.scl_high_period + i2c._spikelen + 7 + i2c.scl_low_period + 1
+        clocks = i2c.scl_high_period + i2c.read_uint32(_IC_FS_SPKLEN) + 7 + i2c.scl_low_period + 1
         self._next = then
         self._alarm.schedule(bits * clocks * _NANOS / i2c.rp2040.clk_sys)
 

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 
+from bubbleskin.sim.rp2040.bus import SpiChip
+
 _SETTING = 4  # bits after the start bit: single or differential, then the channel
 _PULLED_UP = 1  # what the line reads while the chip does not drive it
 
 
-class Mcp3208:
+class Mcp3208(SpiChip):
     """`sample(channel)` is the count, 0 to 4095, at an input now. `silent`: it has died and drives nothing.
 
     A conversion: the first one after chip select is the start bit; four bits of setting follow; the input is

@@ -7,6 +7,8 @@ and here that is when the counter of 4096 wraps, for every output.
 from collections.abc import Callable
 from typing import Any
 
+from bubbleskin.sim.rp2040.bus import I2cChip
+
 _MODE1, _MODE2, _LED0, _ALL_LED, _PRE_SCALE = 0x00, 0x01, 0x06, 0xFA, 0xFE
 _EXTCLK, _INCREMENT, _SLEEP, _ALL_CALL = 0x40, 0x20, 0x10, 0x01
 _ALL_CALL_ADDRESS = 0x70
@@ -17,7 +19,7 @@ _INTERNAL_HZ = 25e6
 _NANOS = 1e9
 
 
-class Pca9685:
+class Pca9685(I2cChip):
     """A chip at `address` on a bus. `changed(output, level)` is called for every edge at its sixteen outputs.
 
     `external_hz()` is the clock at its EXTCLK pin; call `clock_changed` when that has changed. `silent`: it does

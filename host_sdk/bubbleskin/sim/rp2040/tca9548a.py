@@ -3,7 +3,7 @@
 from bubbleskin.sim.rp2040.bus import I2cChip
 
 
-class Tca9548a:
+class Tca9548a(I2cChip):
     """A switch at `address`. Its one register has a bit for each of the eight buses behind it that is joined."""
 
     def __init__(self, address: int = 0x70):

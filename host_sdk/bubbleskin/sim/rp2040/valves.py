@@ -50,8 +50,3 @@ class Valves:
             on = np.where(self._open, dt, np.clip(self._until - plant.time, 0.0, dt))
             plant.advance(dt, on[:, FILL], on[:, VENT], self._pump(), self._dump)
         return plant
-
-    @property
-    def told_open(self) -> np.ndarray:
-        """Which valves are told to be open now, fill and vent of each bubble, (n, 2)."""
-        return self._open.copy()

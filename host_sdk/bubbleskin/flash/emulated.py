@@ -1,6 +1,6 @@
 """A computer with one emulated wristband plugged in: its port while a program runs, its drive while the boot loader does.
 
-What `bubbleskin.flash.Machine` is on a real one. All time is emulated time, and power may fail at any moment.
+The `Machine` of tests. All time is emulated time, and power may fail at any moment.
 """
 
 import errno
@@ -8,9 +8,10 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from bubbleskin.errors import LinkError
+from bubbleskin.flash.machine import Connection, Machine, Sink
 from bubbleskin.sim.board import load_board
 from bubbleskin.sim.rp2040.boot_rom import INFO, BootRom, starts
 from bubbleskin.sim.rp2040.bus import SpiBus
@@ -20,14 +21,19 @@ from bubbleskin.sim.rp2040.mcp3208 import Mcp3208
 PORT = "emulated"
 FLASH_SIZE = 2 << 20
 _STEP = 2e-4
-_PATIENCE = 10.0  # emulated seconds that a read of the port waits
+"""Emulated seconds between two looks at what has come."""
+_PATIENCE = 10.0
+"""Emulated seconds that a read of the port waits."""
 _PUMP_SLICE = 7
+"""Of the PWM: its carrier would be most of the emulator's events, and nobody looks at it."""
 
 
-class EmulatedMachine:
-    """A wristband7 with `flash` in its flash chip, on a computer that shows boot loaders' drives at `drive`."""
+class EmulatedMachine(Machine):
+    """The wristband `board` with `flash` in its flash chip, on a computer that shows boot loaders' drives at `drive`."""
 
-    def __init__(self, flash: bytes | bytearray, drive: Path):
+    def __init__(self, board: str, flash: bytes | bytearray, drive: Path):
+        self.data = load_board(board)
+        """The board's file."""
         self.flash = bytearray(flash).ljust(FLASH_SIZE, b"\xff")
         self.drive = drive
         self.chip: Chip | None = None
@@ -38,7 +44,7 @@ class EmulatedMachine:
         self._passed = 0.0
         self._starts = 0
 
-    # ---- hands of the person at the table
+    # ---- what a person at the table does
 
     def plug_in(self, bootsel: bool = False) -> None:
         """Give the board power; `bootsel`: with the button held."""
@@ -48,8 +54,10 @@ class EmulatedMachine:
         chip = self.chip = Chip(None, self.flash)
         self._starts += 1  # the emulator's random numbers are the same at every start; the firmware adds this one
         chip.mcu.watchdog.scratch_data[0] = self._starts << 8
-        data = load_board("wristband7")
-        SpiBus(chip, 0).add(Mcp3208(lambda channel: data.SENSOR_ZERO), data.CONVERTERS[0][0])
+        data = self.data
+        spi = SpiBus(chip, 0)
+        for pin, _ in data.CONVERTERS:
+            spi.add(Mcp3208(lambda channel: data.SENSOR_ZERO), pin)
         chip.mcu.gpio[data.PIN_ESTOP].set_input_value(False)
         carrier = chip.mcu.pwm.channels[_PUMP_SLICE]
         for alarm in (carrier.alarm_a, carrier.alarm_b, carrier.alarm_bottom):
@@ -58,11 +66,11 @@ class EmulatedMachine:
 
     def pull_out(self) -> None:
         """Take its power. What is in flash stays."""
-        self._keep()
+        self._save_flash()
         self.chip = self.rom = None
         shutil.rmtree(self.drive, ignore_errors=True)
 
-    def _keep(self) -> None:
+    def _save_flash(self) -> None:
         if self.chip:
             self.flash[:] = self.chip.mcu.flash[:FLASH_SIZE]
             self._passed += self.chip.time
@@ -72,7 +80,7 @@ class EmulatedMachine:
         self.drive.mkdir(exist_ok=True)
         (self.drive / "INFO_UF2.TXT").write_text(INFO)
 
-    # ---- bubbleskin.flash.Machine
+    # ---- the names of Machine
 
     def ports(self) -> list[str]:
         """The board's port while there is one."""
@@ -117,12 +125,12 @@ class EmulatedMachine:
             return
         chip.run(seconds)
         if chip.in_boot_loader:
-            self._keep()
+            self._save_flash()
             self.chip = None
             self._show_drive()
 
 
-class EmulatedConnection:
+class EmulatedConnection(Connection):
     """The board's port, opened: a `Transport`, and what `mpremote` needs of pyserial."""
 
     name = PORT
@@ -208,7 +216,7 @@ class EmulatedPort:
         """Let go of it; the board runs on."""
 
 
-class EmulatedFile:
+class EmulatedFile(Sink):
     """A file on the boot loader's drive: its blocks go where the ROM puts them, and nowhere else."""
 
     def __init__(self, machine: EmulatedMachine, rom: BootRom):
@@ -228,9 +236,6 @@ class EmulatedFile:
             self._blocks += 1
             if not machine.written(self._blocks):
                 machine.pull_out()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

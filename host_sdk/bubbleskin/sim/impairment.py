@@ -1,4 +1,4 @@
-"""A line that fails as real ones do, in front of any transport; the same seed fails in the same way."""
+"""A line that is impaired as real ones are, in front of any transport; the same seed impairs it in the same way."""
 
 import random
 from collections.abc import Callable
@@ -7,15 +7,17 @@ from dataclasses import dataclass, fields
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.transport import Transport
 
+_STALL_MAX_S = 60
+
 
 @dataclass(frozen=True)
-class Faults:
-    """How often what goes wrong: shares from 0 to 1, of what is written or read at a time, in both directions.
+class Impairment:
+    """How often what goes wrong on a line: shares from 0 to 1 of what is written or read at a time, in both directions.
 
     `drop`: it is lost. `duplicate`: it comes twice. `reorder`: it comes after the next. `truncate`: its end is
     lost. `flip`: some of its bits are inverted. `stall`: nothing comes for `stall_s` seconds, then all of it.
     `split`: it comes in two parts, the second when the next read comes. `reset`: after the device has answered, and before the
-    answer is read, `FaultLink.reset` is called and the answer is lost.
+    answer is read, the `reset` of `LossyTransport` is called and the answer is lost.
     """
 
     drop: float = 0.0
@@ -31,37 +33,45 @@ class Faults:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not 0 <= value <= (60 if field.name == "stall_s" else 1):
-                what = "seconds, 0 to 60" if field.name == "stall_s" else "a share, 0 to 1"
+            if not 0 <= value <= (_STALL_MAX_S if field.name == "stall_s" else 1):
+                what = f"seconds, 0 to {_STALL_MAX_S}" if field.name == "stall_s" else "a share, 0 to 1"
                 raise InvalidInput(f"{field.name} is {value}; give {what}.")
 
 
-class LossyTransport:
-    """A `Transport` around another, with `faults` on it that `seed` decides.
+class LossyTransport(Transport):
+    """A `Transport` around another, on a line with an `impairment` of which `seed` decides when it strikes.
 
-    `reset()`: what restarts the device, such as `SimulatedBoard.reset`. `on`: whether faults happen now.
-    `counts`: how often each has happened. Frames are lost whole, as a USB stack or a radio loses them:
+    `reset()`: what restarts the device, such as `SimulatedBoard.reset`. `on`: whether the line is impaired now.
+    `counts`: how often each kind has struck. Frames are lost whole, as a USB stack or a radio loses them:
     what is written at a time, and what is read at a time up to each delimiter.
     """
 
-    def __init__(self, transport: Transport, faults: Faults, *, seed: int = 0, reset: Callable[[], None] | None = None):
-        if faults.reset and reset is None:
-            raise InvalidInput("Faults with resets need something to reset: FaultLink(…, reset=board.reset).")
+    def __init__(
+        self,
+        transport: Transport,
+        impairment: Impairment,
+        *,
+        seed: int = 0,
+        reset: Callable[[], None] | None = None,
+    ):
+        if impairment.reset and reset is None:
+            raise InvalidInput(
+                "An impairment with resets needs something to reset: LossyTransport(…, reset=board.reset)."
+            )
         self.name = transport.name
         self.blocks = transport.blocks
+        self.reopens = transport.reopens
         self.on = True
-        self.counts = dict.fromkeys((field.name for field in fields(faults) if field.name != "stall_s"), 0)
+        self.counts = dict.fromkeys((field.name for field in fields(impairment) if field.name != "stall_s"), 0)
         self._transport = transport
-        self._faults = faults
+        self._impairment = impairment
         self._reset = reset
         self._random = random.Random(seed)
         self._late = {False: b"", True: b""}  # reordered: goes with the next; by direction, True: to the device
         self._begun = {False: b"", True: b""}  # a frame whose end has not come
         self._half = b""  # the rest of what was split
-        self._quiet_until = 0.0
+        self._quiet_until = 0.0  # s, of the transport's clock
         self._stalled = b""
-        if hasattr(transport, "reopen"):
-            self.reopen = transport.reopen
 
     def read(self, timeout: float) -> bytes:
         """What comes within `timeout`, or what is left of it."""
@@ -81,7 +91,7 @@ class LossyTransport:
             self._reset()
             return b""
         if self._happens("stall"):
-            self._quiet_until = self.now() + self._faults.stall_s
+            self._quiet_until = self.now() + self._impairment.stall_s
             self._stalled = data
             return b""
         data = self._damaged(data, False)
@@ -100,6 +110,15 @@ class LossyTransport:
     def now(self) -> float:
         """The clock of the transport behind."""
         return self._transport.now()
+
+    @property
+    def behind(self) -> float:
+        """That of the transport behind, s."""
+        return self._transport.behind
+
+    def reopen(self) -> None:
+        """Open the transport behind again."""
+        self._transport.reopen()
 
     def close(self) -> None:
         """Let go of the device."""
@@ -135,9 +154,9 @@ class LossyTransport:
             flipped[self._random.randrange(len(flipped))] ^= 1 << self._random.randrange(8)
         return bytes(flipped)
 
-    def _happens(self, fault: str) -> bool:
-        share = getattr(self._faults, fault)
+    def _happens(self, kind: str) -> bool:
+        share = getattr(self._impairment, kind)
         if not share or self._random.random() >= share:
             return False
-        self.counts[fault] += 1
+        self.counts[kind] += 1
         return True

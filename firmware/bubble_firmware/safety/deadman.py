@@ -1,0 +1,48 @@
+"""The deadman: how long the host has been silent, and what follows from it.
+
+A host that lives says so; what moves while nobody speaks is held after one time of silence, and everything is vented after
+another. Both are settings.
+"""
+
+from bubble_firmware.safety.state import HOST_QUIET, HOST_SILENT, NO_EVENT
+from bubble_protocol.mpy_compat import const
+from bubble_protocol.schema.modes import ACTIVE, HOLDING
+
+_SILENT_MAX = const(1 << 24)  # ticks of silence counted
+
+
+class Deadman:
+    """`silent_ticks`: since the host's last valid frame. `tick` counts them and returns the event they make."""
+
+    def __init__(self, board):
+        self.silent_ticks = 0
+        self._tick_us = board.TICK_US
+        self._hold_ticks = 1
+        self._vent_ticks = 1
+
+    def configure(self, hold_ms: int, vent_ms: int):
+        """After how much silence of the host what moves is held, and everything is vented."""
+        self._hold_ticks = self._ticks(hold_ms)
+        self._vent_ticks = self._ticks(vent_ms)
+
+    def host_activity(self):
+        """A valid frame of the host's has come."""
+        self.silent_ticks = 0
+
+    def tick(self, mode: int, moving: int) -> int:
+        """Count one tick of silence; the event that this makes for a board in state `mode`, or NO_EVENT."""
+        silent = self.silent_ticks
+        if silent < _SILENT_MAX:
+            self.silent_ticks = silent = silent + 1
+        if mode != ACTIVE and mode != HOLDING:
+            return NO_EVENT
+        if silent >= self._vent_ticks:
+            return HOST_SILENT
+        if moving and mode == ACTIVE and silent >= self._hold_ticks:
+            return HOST_QUIET
+        return NO_EVENT
+
+    def _ticks(self, ms: int) -> int:
+        """Whole ticks, at least one."""
+        ticks = ms * 1000 // self._tick_us
+        return ticks if ticks > 1 else 1

@@ -1,0 +1,54 @@
+"""What may follow the `?` of a simulated board's URL: read and checked before anything is started."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from bubbleskin.errors import InvalidInput
+
+_SHARES = ("spread", "loss")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a simulated board, as of `SimulatedBoard` where nothing else is said."""
+
+    seed: int = 0
+    spread: float = 0.0
+    realtime: bool = False
+    """Whether virtual time keeps pace with the wall clock's."""
+    loss: float = 0.0
+    """Share of all frames that the line loses, in both directions."""
+    contact: bool = True
+    store: Path | None = None
+    """The file that keeps its flash."""
+
+    @classmethod
+    def parse(cls, options: dict[str, str], url: str) -> "Options":
+        """From the query of `url`; `InvalidInput` for an option that is not known or not a number."""
+        known = [field.name for field in fields(cls)]
+        for name in options:
+            if name not in known:
+                raise InvalidInput(f"{url} has the option {name!r}; known are {', '.join(known)}.")
+        values = {name: _number(name, text, url) for name, text in options.items() if name != "store"}
+        return cls(
+            seed=int(values.get("seed", 0)),
+            spread=values.get("spread", 0.0),
+            realtime=bool(values.get("realtime", False)),
+            loss=values.get("loss", 0.0),
+            contact=bool(values.get("contact", True)),
+            store=_file(options["store"], url) if "store" in options else None,
+        )
+
+
+def _number(name: str, text: str, url: str) -> float:
+    try:
+        return float(text) if name in _SHARES else int(text)
+    except ValueError:
+        kind = "a number" if name in _SHARES else "a whole number"
+        raise InvalidInput(f"{url} has {name}={text!r}, which is not {kind}.") from None
+
+
+def _file(name: str, url: str) -> Path:
+    if not (name and url.startswith("sim:")):
+        raise InvalidInput(f"{url} has store={name!r}; only sim:// keeps its store in a file: store=wristband.bin.")
+    return Path(name)
