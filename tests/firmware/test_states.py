@@ -74,7 +74,7 @@ def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, thin
     for thing in things:
         if isinstance(thing, tuple):
             rig.hal.active_faults = thing[1]
-            rig.app.safety.heard()
+            rig.app.deadman.host_activity()
             rig.app.tick()
         elif "silence" in thing:
             silence(rig, 210 if "long" in thing else 55)
