@@ -164,7 +164,7 @@ def test_progress_is_told(skin):
     told = []
     sequence = bs.Sequence([bs.Step(shape(skin, 6.0), 0.05, name="up"), bs.Step(shape(skin, 7.0), 0.05)], loops=2)
     skin.play(sequence, progress=told.append)
-    assert [(one.step, one.name, one.played, one.steps) for one in told if one.state == "playing"] == [
+    assert [(one.step, one.name, one.begun_steps, one.steps) for one in told if one.state == "playing"] == [
         (0, "up", 1, 4),
         (1, "", 2, 4),
         (0, "up", 3, 4),

@@ -1,11 +1,17 @@
 """Heights in, shapes out: the SDK of the bubbleskin wristbands."""
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.connect import aconnect, connect
-from bubbleskin.device.records import Health, Info, State
-from bubbleskin.device.stored import StoreInfo, Trim
+from bubbleskin.device.faults import Fault
+from bubbleskin.device.health import Health, TickHistogram
+from bubbleskin.device.info import Info
+from bubbleskin.device.settings import Setting
+from bubbleskin.device.state import State
+from bubbleskin.device.store import StoreInfo
+from bubbleskin.device.trim import Trim
 from bubbleskin.errors import (
     BubbleskinError,
     DeviceFault,
@@ -20,9 +26,12 @@ from bubbleskin.errors import (
 )
 from bubbleskin.layout import Layout
 from bubbleskin.sequence import library as sequences
-from bubbleskin.sequence.model import After, Repeat, Sequence, Settled, Step
-from bubbleskin.sequence.player import Played, Playing
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.sequence.model import Sequence
+from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus
+from bubbleskin.sequence.steps import After, Repeat, Settled, Step
+from bubbleskin.shape import shapes
+from bubbleskin.skin import Skin
+from bubbleskin.telemetry.recording import Recording
 
 if TYPE_CHECKING:
     from bubbleskin.contact.fit import ContactFit, Measured, fit_contact
@@ -43,7 +52,7 @@ if TYPE_CHECKING:
     from bubbleskin.planner.search import plan
 
 # The physics takes scipy, which takes a second to import, and contact takes numba; a script that only shows heights
-# need not wait for them.
+# need not wait for them. A type checker finds them above.
 _LATER = {
     "Calibration": "membrane",
     "CompliantContact": "contact.model",
@@ -75,6 +84,7 @@ __all__ = [
     "DeviceRefused",
     "DeviceRestarted",
     "DeviceSilent",
+    "Fault",
     "Health",
     "Info",
     "InvalidInput",
@@ -84,11 +94,13 @@ __all__ = [
     "NoEquilibrium",
     "Overtaken",
     "Plan",
-    "Played",
-    "Playing",
+    "PlaybackReport",
+    "PlaybackStatus",
+    "Recording",
     "Repeat",
     "RigidContact",
     "Sequence",
+    "Setting",
     "Settled",
     "Shape",
     "Skin",
@@ -96,6 +108,7 @@ __all__ = [
     "Step",
     "StoreInfo",
     "Table",
+    "TickHistogram",
     "Trim",
     "WrongDevice",
     "YeohBalloon",
@@ -110,10 +123,17 @@ __all__ = [
     "preset",
     "read_csv",
     "sequences",
+    "shapes",
 ]
 
+if not TYPE_CHECKING:  # where a checker saw this, it would take every misspelt name for something that is found here
 
-def __getattr__(name: str) -> Any:
-    if name not in _LATER:
-        raise AttributeError(f"module 'bubbleskin' has no attribute {name!r}")
-    return getattr(import_module(f"bubbleskin.{_LATER[name]}"), name)
+    def __getattr__(name):
+        if name not in _LATER:
+            raise AttributeError(f"module 'bubbleskin' has no attribute {name!r}")
+        return getattr(import_module(f"bubbleskin.{_LATER[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """The public names, and not the modules that happen to have been imported."""
+    return __all__

@@ -1,12 +1,16 @@
 """From a URL to a wristband: serial ports, sockets, and simulated boards."""
 
-from typing import Any
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.transport import SerialTransport, Transport, only_attached
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
+
+if TYPE_CHECKING:
+    from bubbleskin.sim.board import Simulated
 
 SIMULATED = ("sim", "micropython", "rp2040")
 NETWORK = ("socket", "rfc2217")
@@ -35,7 +39,7 @@ async def aconnect(url: str | None = None, *, timeout: float = 2.0) -> AsyncSkin
     return await AsyncSkin.open(transport, patience, event_loop=True, simulated=board)
 
 
-def open_transport(url: str | None) -> tuple[Transport, Any]:
+def open_transport(url: str | None) -> "tuple[Transport, Simulated | None]":
     """The transport for a URL, and the simulated board behind it where there is one."""
     if url is None:
         return SerialTransport(only_attached()), None

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.device.records import State
+from bubbleskin.device.state import State
 from bubbleskin.errors import DeviceFault
 from bubbleskin.layout import Layout
 from bubbleskin.shape import shapes

@@ -40,6 +40,9 @@ class Layout:
     def __len__(self) -> int:
         return len(self.positions_mm)
 
+    def __repr__(self) -> str:
+        return f"<Layout of {len(self)} bubbles, {self.pitch_mm:g} mm apart>"
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layout) and np.array_equal(self.positions_mm, other.positions_mm)
 

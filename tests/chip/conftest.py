@@ -29,10 +29,11 @@ def uf2():
 @pytest.fixture
 def emulated(uf2) -> Iterator:
     """`emulated(board, absent=…)`: a skin of a freshly booted emulated board."""
+    from bubbleskin.async_skin import AsyncSkin
     from bubbleskin.link.link import run_sync
     from bubbleskin.sim.rp2040 import open_chip
     from bubbleskin.sim.transport import SimulatedTransport
-    from bubbleskin.skin import AsyncSkin, Skin
+    from bubbleskin.skin import Skin
 
     skins = []
 

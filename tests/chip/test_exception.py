@@ -7,11 +7,12 @@ The firmware has no switch for this. The prompt of the BARE firmware starts the 
 import numpy as np
 import pytest
 
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim.rp2040.board import Rp2040Board
 from bubbleskin.sim.rp2040.prompt import Prompt
 from bubbleskin.sim.transport import SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 from bubbleskin.toolchain.rp2040 import BARE
 
 pytestmark = pytest.mark.chip

@@ -10,11 +10,12 @@ from array import array
 import pytest
 
 from bubble_firmware import boards
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.transport import SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 from bubbleskin.toolchain.rp2040 import BARE
 
 pytestmark = pytest.mark.chip

@@ -137,11 +137,11 @@ def test_demo_prints_heights_and_draws(run, tmp_path):
 
 @pytest.mark.slow
 def test_sim_serves_other_programs_until_it_is_interrupted():
-    command = [sys.executable, "-m", "bubbleskin.cli", "sim", "--json", "--port", "0"]
+    command = [sys.executable, "-m", "bubbleskin", "sim", "--json", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
         try:
             device = json.loads(server.stdout.readline())["device"]
-            show = [sys.executable, "-m", "bubbleskin.cli", "show", "--shape", "dome", "--device", device]
+            show = [sys.executable, "-m", "bubbleskin", "show", "--shape", "dome", "--device", device]
             shown = subprocess.run(show, capture_output=True, text=True, timeout=60, check=False)
             assert shown.returncode == 0, shown.stderr
         finally:

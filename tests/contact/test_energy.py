@@ -69,7 +69,7 @@ def test_curvature_is_that_of_the_gradient(model):
 
 
 def test_energy_is_the_sum_of_its_terms():
-    """Against the formula of FACTS, spelled out in sympy for two bubbles that touch, one of them off its base."""
+    """Against the formula of docs/contact.md, spelled out in sympy for two bubbles that touch, one of them off its base."""
     x, y, z, R, u, v, w, S = sympy.symbols("x y z R u v w S", real=True)
     mu, c2, c3, h0, r0 = 39.62e3, 417.3, 60.65, 1e-3, 2.5e-3
     P, Q, kz, kbase, kxy, kc, d = 21e3, 18e3, 10, 3000, 50, 300, 10e-3

@@ -8,8 +8,8 @@ import pytest
 import bubbleskin as bs
 from bubble_protocol import steps
 from bubble_protocol.schema import errors, messages
-from bubbleskin.device.records import Info
-from bubbleskin.sequence.compile import Program, check
+from bubbleskin.device.info import Info
+from bubbleskin.sequence.compile import Compiled, check
 
 EASINGS = ["linear", "smooth", "in", "out"]
 THEN = ["go on", "hold", "vent", "stop"]
@@ -119,7 +119,7 @@ def test_the_sdks_records_are_those_of_the_protocols_page(seven):
         if sequence is None or '"repeat": 1,' in sequence.to_json():
             continue
         compared += 1
-        assert Program.of(sequence, info, layout).records.tolist() == encode(parts, 2, 7)
+        assert Compiled.of(sequence, info, layout).records.tolist() == encode(parts, 2, 7)
 
 
 def test_random_words_never_harm(seven):

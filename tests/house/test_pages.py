@@ -54,3 +54,20 @@ def test_every_decision_is_in_the_list(pages):
 def test_a_path_that_is_not_there_is_found(root):
     text = "See `link/nowhere.py`, `link/clock.py`, `bubble_firmware/boards/` and [this](control.md), [that](gone.md)."
     assert missing({"docs/planted.md": text}, root) == ["docs/planted.md: link/nowhere.py", "docs/planted.md: gone.md"]
+
+
+def unknown_names(glossary: str, code: str) -> list[str]:
+    """Names in the second column of the glossary that no code has."""
+    cells = [line.split("|")[2] for line in glossary.splitlines() if line.startswith("|") and line.count("|") == 5]
+    names = {name for cell in cells for name in re.findall(r"`([\w.]+)`", cell)}
+    return sorted(name for name in names if not re.search(rf"\b_?{name.rpartition('.')[2]}\b", code))
+
+
+def test_the_glossarys_names_are_names(pages, product, judge):
+    found = unknown_names(pages["docs/glossary.md"], "\n".join(product.values()))
+    judge("glossary", {name: f"{name} is in docs/glossary.md and in no code" for name in found})
+
+
+def test_a_name_that_is_no_name_is_found():
+    text = "| term | name | unit | what |\n|---|---|---|---|\n| air | A; `AIR`, `WIND` | µJ | `NOT_LOOKED_AT` |\n"
+    assert unknown_names(text, "_AIR = const(10)\n") == ["WIND"]

@@ -9,6 +9,7 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane import (
     IdentifiabilityWarning,
     LackOfFitWarning,
+    Noise,
     YeohBalloon,
     fit_measurements,
     fit_sheet,
@@ -36,7 +37,7 @@ def test_intervals_cover_the_truth(kind):
     """200 sheets of seven bubbles, 0.15 kPa and 0.05 mm of noise: at least 93 % for every constant."""
     inside = []
     for seed in range(SHEETS):
-        measured, true = simulate_sheet(7, settings=12, repeats=2, seed=seed)
+        measured, true = simulate_sheet(7, heights_mm=np.linspace(5.4, 13.0, 12), repeats=2, seed=seed)
         if kind == "shared prior":
             fits = list(fit_sheet(measured.bubble, measured.height, measured.pressure).values())
         else:
@@ -51,7 +52,7 @@ def test_intervals_cover_the_truth(kind):
 
 
 def test_intervals_are_not_just_wide():
-    measured, true = one_bubble(1, settings=14, repeats=3)
+    measured, true = one_bubble(1, heights_mm=np.linspace(5.4, 13.0, 14), repeats=3)
     low, high = fit_yeoh(measured.height, measured.pressure).interval().T
     assert np.all((high - low) / 2 / truth(true) < [0.02, 0.2, 0.08])
 
@@ -84,8 +85,8 @@ def test_noise_in_height_does_not_bias():
     """Height noise alone, ten times the usual: regression of P on h would tilt the steep part."""
     errors = []
     for seed in range(60):
-        measured, true = one_bubble(seed, height_sd=0.3e-3, pressure_sd=10.0, settings=40, repeats=1)
-        fit = fit_yeoh(measured.height, measured.pressure, height_sd=0.3e-3, pressure_sd=10.0)
+        measured, true = one_bubble(seed, noise=Noise(0.3e-3, 10.0), heights_mm=np.linspace(5.4, 13.0, 40), repeats=1)
+        fit = fit_yeoh(measured.height, measured.pressure, noise=Noise(0.3e-3, 10.0))
         errors.append((fit.parameters - truth(true)) / np.sqrt(np.diag(fit.covariance)))
     assert np.all(np.abs(np.mean(errors, axis=0)) < 3.5 / np.sqrt(60))
 
@@ -101,7 +102,7 @@ def test_outliers_are_ignored_and_named():
     assert np.flatnonzero(fit.outliers).tolist() == [3, 8, 17, 30, 36]
     moved = np.abs(np.subtract(fit.parameters, clean.parameters)) / np.sqrt(np.diag(clean.covariance))
     assert moved.max() < 1
-    naive = fit_yeoh(height, pressure, robust=False)
+    naive = fit_yeoh(height, pressure, noise=Noise(outliers=False))
     assert np.max(np.abs(np.subtract(naive.parameters, truth(true)) / np.sqrt(np.diag(clean.covariance)))) > 5
 
 
@@ -132,7 +133,7 @@ def test_bands_cover_the_curve():
     h = np.linspace(5.5, 13.5, 33) * 1e-3
     inside_p, inside_h = [], []
     for seed in range(150):
-        measured, true = one_bubble(seed, settings=12, repeats=2)
+        measured, true = one_bubble(seed, heights_mm=np.linspace(5.4, 13.0, 12), repeats=2)
         fit = fit_yeoh(measured.height, measured.pressure)
         exact = true.pressure_at_height(h)
         low, high = fit.pressure_band(h)
@@ -154,7 +155,7 @@ def test_height_band_is_wide_on_the_plateau_and_narrow_off_it():
 
 
 def test_plateau_alone_is_doubted():
-    measured, _ = one_bubble(0, heights_mm=(7.0, 9.0))
+    measured, _ = one_bubble(0, heights_mm=np.linspace(7.0, 9.0, 14))
     with pytest.warns(IdentifiabilityWarning, match=r"Measure below 6\.5 mm and above 10\.5 mm"):
         fit = fit_yeoh(measured.height, measured.pressure)
     assert "do not determine all three constants" in fit.notes[0]
@@ -162,10 +163,10 @@ def test_plateau_alone_is_doubted():
 
 
 def test_a_range_too_short_for_its_noise_is_doubted():
-    measured, _ = one_bubble(0, heights_mm=(5.5, 8.8), settings=10, repeats=1)
+    measured, _ = one_bubble(0, heights_mm=np.linspace(5.5, 8.8, 10), repeats=1)
     with pytest.warns(IdentifiabilityWarning, match=r"Measure above 10\.5 mm"):
         fit_yeoh(measured.height, measured.pressure)
-    measured, _ = simulate_sheet(3, heights_mm=(7.0, 9.0), settings=5, repeats=1)
+    measured, _ = simulate_sheet(3, heights_mm=np.linspace(7.0, 9.0, 5), repeats=1)
     with pytest.warns(IdentifiabilityWarning, match="bubbles 0, 1, 2: the heights measured"):
         sheet = fit_sheet(measured.bubble, measured.height, measured.pressure)
     assert all(fit.notes for fit in sheet.values())
@@ -174,7 +175,7 @@ def test_a_range_too_short_for_its_noise_is_doubted():
 
 def test_good_data_is_not_doubted():
     for seed in range(20):
-        measured, _ = one_bubble(seed, settings=12, repeats=1)
+        measured, _ = one_bubble(seed, heights_mm=np.linspace(5.4, 13.0, 12), repeats=1)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             assert fit_yeoh(measured.height, measured.pressure).notes == ()
@@ -182,7 +183,7 @@ def test_good_data_is_not_doubted():
 
 @noisy
 def test_triplicates_tell_noise_from_a_wrong_model():
-    measured, _ = one_bubble(0, settings=15)
+    measured, _ = one_bubble(0, heights_mm=np.linspace(5.4, 13.0, 15))
     right = fit_yeoh(measured.height, measured.pressure, step=measured.step)
     assert right.repeats.settings == 15
     assert right.repeats.p_value > 0.01
@@ -197,7 +198,7 @@ def test_triplicates_tell_noise_from_a_wrong_model():
 
 
 def test_sheet_lends_shape_to_a_bubble_with_few_points():
-    measured, true = simulate_sheet(7, settings=14, seed=11)
+    measured, true = simulate_sheet(7, heights_mm=np.linspace(5.4, 13.0, 14), seed=11)
     poor = measured.bubble == 3
     keep = ~poor | (poor & np.isin(measured.step, [2, 5, 8]) & (np.arange(len(measured)) % 3 == 0))
     sheet = fit_sheet(measured.bubble[keep], measured.height[keep], measured.pressure[keep])
@@ -234,7 +235,7 @@ def test_outliers_of_a_sheet_are_ignored_and_named():
 @noisy
 def test_c3_of_a_sheet_is_never_negative():
     soft = YeohBalloon(mu=15.8e3, c2=127.0, c3=0.0)
-    measured, _ = simulate_sheet(7, balloon=soft, spread=0.05, settings=12, repeats=1, seed=1)
+    measured, _ = simulate_sheet(7, balloon=soft, spread=0.05, heights_mm=np.linspace(5.4, 13.0, 12), repeats=1, seed=1)
     h = np.maximum(measured.height, soft.rest_height)
     stiffening = YeohBalloon(mu=15.8e3, c2=127.0, c3=8.0).pressure_at_height(h) - soft.pressure_at_height(h)
     sheet = fit_sheet(measured.bubble, measured.height, measured.pressure - stiffening)  # C3 = -8 Pa
@@ -266,8 +267,8 @@ GOOD_P = YeohBalloon().pressure_at_height(GOOD_H)
         ({"height": np.full(10, 5.01e-3)}, "no inflation to fit"),
         ({"pressure": np.linspace(60e3, 1e3, 10)}, "shear modulus of -"),
         ({"thickness": 0}, "thickness is 0 m"),
-        ({"pressure_sd": 0}, "pressure_sd is 0"),
-        ({"height_sd": [1e-3, 1e-3]}, "one number or one per point"),
+        ({"noise": Noise(pressure_sd=0)}, "pressure_sd is 0"),
+        ({"noise": Noise(height_sd=[1e-3, 1e-3])}, "one number or one per point"),
         ({"step": [1, 2]}, "each of the 10 points"),
     ],
 )

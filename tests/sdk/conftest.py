@@ -10,11 +10,12 @@ from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import NO_KEY, Decoder, finish_frame
 from bubble_protocol.schema import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.message import Reader, encode, session_key
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
 from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 
 
 class Background:
@@ -194,7 +195,7 @@ class Tap:
 
     def understood(self, data):
         """The messages of the open session in `data`, but for the PINGs that keep the link alive and their replies."""
-        reader = Reader(self.skin._skin._link._window.key)
+        reader = Reader(self.skin.link._window.key)
         return [message for message in reader.feed(bytes(data)) if message.id & 0x7F != messages.PING]
 
     def now(self):

@@ -71,9 +71,9 @@ def test_telemetry_and_show_side_by_side(url):
             watching.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await watching
-            skin._link.telemetry.clear()
+            skin.link.telemetry.clear()
             await skin.sleep(0.2)
-            assert not skin._link.telemetry, "the device was told to send no more"
+            assert not skin.link.telemetry, "the device was told to send no more"
         assert np.diff([state.time for state in seen]) == pytest.approx(0.02)
         assert {9.5, 11.0, 10.0} <= {float(state.target_mm[0]) for state in seen}
 

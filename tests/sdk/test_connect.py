@@ -18,11 +18,11 @@ import bubbleskin as bs
 from bubble_protocol import version
 from bubble_protocol.frame import FRAME_MAX
 from bubble_protocol.schema import errors
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.message import encode
 from bubbleskin.link.transport import USB_IDS
 from bubbleskin.sim.serve import PtyEnd
-from bubbleskin.skin import AsyncSkin
 
 pytestmark = pytest.mark.timeout(30)
 

@@ -40,9 +40,9 @@ def keepers():
 
 @pytest.mark.parametrize("event_loop", [False, True])
 def test_as_virtual_time_passes(event_loop):
+    from bubbleskin.async_skin import AsyncSkin
     from bubbleskin.link.link import run_sync
     from bubbleskin.sim import SimulatedBoard, SimulatedTransport
-    from bubbleskin.skin import AsyncSkin
 
     board = SimulatedBoard("wristband7")
     line = Times(SimulatedTransport(board, "sim"))
@@ -99,7 +99,7 @@ def test_a_skin_that_nobody_holds_is_let_go(served_port):
 def test_every_round_trip_is_told(served_port):
     with bs.connect(served_port.name) as skin:
         told = []
-        skin._skin._link.on_ping = lambda *trip: told.append(trip)
+        skin.link.on_ping = lambda *trip: told.append(trip)
         time.sleep(1.0)
         assert len(told) >= 3
         assert all(0 < received_at - sent_at < 1 for sent_at, _, received_at in told)

@@ -134,7 +134,7 @@ def test_a_half_frame_on_the_line_does_not_spoil_the_greeting(tapped):
     skin, _ = tapped()
     skin.simulated.to_device += b"\x07half a frame"
     with pytest.raises(bs.DeviceRefused):  # the board is fine, only that frame was not
-        run_sync(skin._skin._link.call("SHOW", (0,), [(6000,)]))
+        run_sync(skin.link.call("SHOW", (0,), [(6000,)]))
     skin, tap = tapped(change=lambda data: data)
     assert tap.sent[0] == 0, "the first byte ends whatever stood on the line"
 
@@ -155,7 +155,7 @@ def test_telemetry_ends_with_its_iterator(tapped):
 
 def test_telemetry_in_pieces_is_whole(tapped):
     skin, _ = tapped()
-    link = skin._skin._link
+    link = skin.link
     read = link.transport._transport.read
     rest = bytearray()
 
@@ -187,7 +187,7 @@ def test_telemetry_that_a_device_forgot_is_asked_for_again(tapped):
     skin, tap = tapped(timeout=0.5)
     states = skin.telemetry(50)
     next(states)
-    run_sync(skin._skin._link.hello())
+    run_sync(skin.link.hello())
     begin = tap.now()
     times = [next(states).time for _ in range(5)]
     assert tap.now() - begin < 1.0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import Link, run_sync
 from bubbleskin.sim import Impairment, LossyTransport, SimulatedBoard, SimulatedTransport
-from bubbleskin.skin import AsyncSkin
 
 pytestmark = pytest.mark.timeout(60)
 

@@ -8,9 +8,10 @@ import pytest
 
 import bubbleskin as bs
 from bubble_protocol.schema import faults, messages
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -138,7 +139,7 @@ def test_a_stream_that_runs_dry_is_a_fault_that_is_named(narrow):
     held = [0.0]
 
     def hold_up(playing):
-        if playing.played == 5:
+        if playing.begun_steps == 5:
             held[0] = skin.simulated.time + 1.0
 
     with pytest.raises(bs.DeviceFault, match=r"ran dry after step \d+: .* The last shape is held"):

@@ -39,7 +39,7 @@ def skin(request):
 
 
 def call(skin, name, fixed=(), repeated=()):
-    return run_sync(skin._skin._link.call(name, fixed, repeated))
+    return run_sync(skin.link.call(name, fixed, repeated))
 
 
 def refused(skin, sentence, name, fixed=(), repeated=()):
@@ -129,7 +129,7 @@ def test_what_only_a_device_says(skin, name):
 
 
 def test_a_host_that_speaks_no_common_protocol(skin):
-    transport = skin._skin._link.transport
+    transport = skin.link.transport
     newest = version.PROTOCOL_MAX
     transport.write(encode("HELLO", 999, (newest + 1, newest + 9, 1)))
     (answer,) = Reader().feed(transport.read(0.1))

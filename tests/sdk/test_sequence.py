@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 import bubbleskin as bs
 from bubbleskin.sequence.files import SCHEMA
-from bubbleskin.sequence.model import EASINGS, STEPS_MAX, THEN
+from bubbleskin.sequence.steps import EASINGS, STEPS_MAX, THEN
 
 N = 3
 SCHEMA_DATA = json.loads(SCHEMA.read_text(encoding="utf-8"))

@@ -10,7 +10,9 @@ import pytest
 from bubble_protocol import codec
 from bubble_protocol.frame import FRAME_MAX, Decoder, finish_frame, put_header
 from bubble_protocol.schema import errors, faults, messages, modes, self_test, sequences, store
-from bubbleskin.device.records import Health, Info, State
+from bubbleskin.device.health import Health
+from bubbleskin.device.info import Info
+from bubbleskin.device.state import State
 from bubbleskin.link.message import SCHEMA_CRC, Reader, _crc32_into, describe_refusal, encode
 
 

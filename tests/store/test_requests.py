@@ -8,11 +8,11 @@ import pytest
 import bubbleskin as bs
 from bubble_protocol import codec
 from bubble_protocol.schema import system
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim import SimulatedBoard
 from bubbleskin.sim.flash import NorFlash, PowerCut
 from bubbleskin.sim.transport import SimulatedTransport
-from bubbleskin.skin import AsyncSkin
 
 
 def open_board(**options):
@@ -68,7 +68,7 @@ def test_power_may_fail_while_the_host_waits():
         skin.upload_tables(TABLE, save=True)
 
 
-@pytest.mark.parametrize("ask", [bs.Skin.save, bs.Skin.factory_reset, lambda skin: skin.upload_figures(skin.figures())])
+@pytest.mark.parametrize("ask", [bs.Skin.save, bs.Skin.factory_reset, lambda skin: skin.upload_trim(skin.trim())])
 def test_only_while_vented(skin, ask):
     flash = skin.simulated.firmware.flash
     skin.show([6.0] * 7)
@@ -126,11 +126,11 @@ def test_refusals_are_sentences():
 
 def test_figures_are_used_kept_and_checked(skin):
     n = skin.info.bubbles
-    made_with = skin.figures()
+    made_with = skin.trim()
     other = dataclasses.replace(made_with, zero=made_with.zero + np.arange(n), closes_us=made_with.closes_us - 200)
-    skin.upload_figures(other, save=True)
+    skin.upload_trim(other, save=True)
     lose_power(skin)
-    assert all((getattr(skin.figures(), name) == getattr(other, name)).all() for name in vars(other))
+    assert all((getattr(skin.trim(), name) == getattr(other, name)).all() for name in vars(other))
     skin.sleep(0.1)  # zeros that are higher read lower pressures
     assert np.allclose(np.diff(skin.state().pressure_kpa).mean(), -0.017, atol=0.03)
     for name, value, allowed in (
@@ -141,15 +141,15 @@ def test_figures_are_used_kept_and_checked(skin):
         values = getattr(made_with, name).copy()
         values[3] = value
         with pytest.raises(bs.DeviceRefused, match=rf"entry 3.* is {value}.*; {allowed}"):
-            skin.upload_figures(dataclasses.replace(made_with, **{name: values}))
+            skin.upload_trim(dataclasses.replace(made_with, **{name: values}))
     for wrong, said in (
         ([160] * (n - 1), "one number for each of 7 bubbles"),
         ([160.5] * n, "must be whole numbers"),
         ([-1] * n, "numbers from 0 to 65535"),
     ):
         with pytest.raises(bs.InvalidInput, match=said):
-            skin.upload_figures(dataclasses.replace(made_with, zero=np.array(wrong)))
-    assert (skin.figures().zero == other.zero).all()
+            skin.upload_trim(dataclasses.replace(made_with, zero=np.array(wrong)))
+    assert (skin.trim().zero == other.zero).all()
 
 
 def test_a_store_in_a_file_outlives_the_program(tmp_path):

@@ -6,7 +6,7 @@ python tools/report/faults.py --sheets 0           # only false alarms
 
 Each fault is given to one bubble in each situation, on sheets that match the tables and on sheets that do not. A
 fault without any effect as long as nothing moves (a fill valve that does not open, say) is followed by moves, and
-timed from the first pulse that it spoils. The same arguments give the same figures.
+timed from the first pulse that it spoils. The same arguments give the same values.
 """
 
 import argparse
@@ -20,10 +20,13 @@ from rich.progress import track
 import bubbleskin as bs
 
 VICTIM = 3
+"""The bubble that gets the fault."""
 REST = 0.8
+"""Seconds until a shape is at rest."""
 PATIENCE = 1.0
+"""Seconds for which a fault is waited for."""
 TARGET = 0.5
-"""Seconds within which DESIGN.md wants a bubble isolated."""
+"""Seconds within which a faulty bubble is to be isolated."""
 
 
 @dataclass(frozen=True)
@@ -91,45 +94,24 @@ class Found:
 
 def inject(url: str, fault: Injected, situation: str, found: Found) -> None:
     """One fault on one sheet."""
-    start, then, over = SITUATIONS[situation]
     with bs.connect(url) as skin:
         board = skin.simulated
         assert board is not None
-        n = skin.info.bubbles
-        heights = np.linspace(6.0, 12.0, n)
-
-        def show(height: float, over: float = 0.0) -> None:
-            heights[VICTIM] = height
-            skin.show(heights, over=over, wait=False)
-
-        skin.sleep(0.1)
-        if start is not None:
-            show(start)
-            skin.sleep(REST)
-        if then == "stop":
-            skin.stop()
-            skin.sleep(0.3)
-        elif isinstance(then, float):
-            show(then, over)
-            skin.sleep(0.05 if not over else 0.3)
+        show = _Shower(skin)
+        _bring_about(skin, show, situation)
         if skin.fault_log():
             raise RuntimeError(f"{situation}: {skin.fault_log()} before the fault")
-        value = fault.value
-        if value is None:
-            value = float(board.plant.sense()[VICTIM])
+        value = float(board.plant.sense()[VICTIM]) if fault.value is None else fault.value
         board.inject(fault.name, VICTIM, value)
         time = _wait(skin, fault)
         if time is not None:
             found.times.append(time)
         else:
-            for move in (13.0, 7.0, 0.0):
-                show(move)
-                time = _wait(skin, fault)
-                if time is not None:
-                    found.later.append(time)
-                    break
-            else:
+            later = _wait_for_moves(skin, show, fault)
+            if later is None:
                 found.missed += 1
+            else:
+                found.later.append(later)
         skin.sleep(0.6)
         for entry in skin.fault_log():
             if entry.bubble is None:
@@ -138,6 +120,42 @@ def inject(url: str, fault: Injected, situation: str, found: Found) -> None:
                 found.names.add(entry.name)
             else:
                 found.others += 1
+
+
+class _Shower:
+    """Shows a height (mm) of the victim while the other bubbles stay as they are."""
+
+    def __init__(self, skin: bs.Skin) -> None:
+        self._skin = skin
+        self._heights = np.linspace(6.0, 12.0, skin.info.bubbles)
+
+    def __call__(self, height: float, over: float = 0.0) -> None:
+        self._heights[VICTIM] = height
+        self._skin.show(self._heights, over=over, wait=False)
+
+
+def _bring_about(skin: bs.Skin, show: _Shower, situation: str) -> None:
+    start, then, over = SITUATIONS[situation]
+    skin.sleep(0.1)
+    if start is not None:
+        show(start)
+        skin.sleep(REST)
+    if then == "stop":
+        skin.stop()
+        skin.sleep(0.3)
+    elif isinstance(then, float):
+        show(then, over)
+        skin.sleep(0.05 if not over else 0.3)
+
+
+def _wait_for_moves(skin: bs.Skin, show: _Shower, fault: Injected) -> float | None:
+    """As `_wait`, in one move after the other; None where none of them shows the fault."""
+    for height in (13.0, 7.0, 0.0):
+        show(height)
+        time = _wait(skin, fault)
+        if time is not None:
+            return time
+    return None
 
 
 def _spoils(fault: Injected, fill: float, vent: float, tick: float) -> bool:

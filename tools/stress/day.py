@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import SimulatedBoard, load_board
 from bubbleskin.sim.micropython import MicroPythonFirmware
 from bubbleskin.sim.plant import Plant, PlantParameters
 from bubbleskin.sim.transport import SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 
 SUBSTEP = 100e-6
 """Twice the simulator's step: a day is long, and the air's last micrometre is not what is looked at here."""

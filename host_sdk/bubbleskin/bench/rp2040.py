@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bubble_firmware.control import state_layout as layout
 from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.table import Tables
+from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.bench import float_law
 from bubbleskin.bench.rows import Row
 from bubbleskin.bench.trace import Tick, record
@@ -20,7 +21,7 @@ from bubbleskin.sim.rp2040 import open_chip
 from bubbleskin.sim.rp2040.chip import CLOCK_HZ, Chip
 from bubbleskin.sim.rp2040.prompt import Prompt
 from bubbleskin.sim.transport import SimulatedTransport
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 from bubbleskin.toolchain.rp2040 import BARE, firmware
 
 _US = CLOCK_HZ // 1_000_000  # cycles

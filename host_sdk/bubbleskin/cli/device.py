@@ -13,7 +13,7 @@ from rich.table import Table
 from bubbleskin.cli.options import as_json, device
 from bubbleskin.connect import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
-from bubbleskin.device.records import State
+from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
 from bubbleskin.shape import shapes
 from bubbleskin.shape.heightfield import Heights
@@ -143,7 +143,7 @@ def show(
     if path is not None:
         asked = shapes.load(path)
     elif everywhere is None:
-        asked = shapes.numbers(heights)
+        asked = shapes.parse_heights(heights)
     with connect(device) as skin:
         if shape:
             asked = shapes.SHAPES[shape](skin.layout)

@@ -69,10 +69,11 @@ def build(boards: tuple[str, ...], micropython: Path | None, output: Path | None
 
 
 def _free_heap(board: str, uf2: Path) -> int:
+    from bubbleskin.async_skin import AsyncSkin
     from bubbleskin.link.link import run_sync
     from bubbleskin.sim.rp2040 import open_chip
     from bubbleskin.sim.transport import SimulatedTransport
-    from bubbleskin.skin import AsyncSkin, Skin
+    from bubbleskin.skin import Skin
 
     chip: Any = open_chip(board, uf2)
     transport = SimulatedTransport(chip, f"rp2040://{board}")

@@ -180,15 +180,14 @@ def fit_file(
     wall: str,
 ) -> tuple[Measurements, YeohFit | SheetFit]:
     """Read a file of measurements and fit it as its options say."""
-    from bubbleskin.membrane import fit_measurements, read_csv
+    from bubbleskin.membrane import Noise, fit_measurements, read_csv
 
     with _said():
         measurements = read_csv(data, skip_bad_rows=skip_bad_rows)
         return measurements, fit_measurements(
             measurements,
             pooled=pooled,
-            height_sd=height_noise_mm * 1e-3,
-            pressure_sd=pressure_noise_kpa * 1e3,
+            noise=Noise(height_noise_mm * 1e-3, pressure_noise_kpa * 1e3),
             thickness=thickness_mm * 1e-3,
             radius=diameter_mm * 0.5e-3,
             wall=wall,

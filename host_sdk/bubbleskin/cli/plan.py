@@ -53,7 +53,9 @@ def plan(
     if sum([bool(heights), shape is not None, path is not None]) != 1:
         raise InvalidInput("Say the shape in one way: a height in mm per bubble, or one of --shape and --file.")
     layout = Layout.from_file(layout_path) if layout_path else Layout.of_board(board, _BOARDS[board])
-    asked: Heights = shapes.load(path) if path else shapes.SHAPES[shape](layout) if shape else shapes.numbers(heights)
+    asked: Heights = (
+        shapes.load(path) if path else shapes.SHAPES[shape](layout) if shape else shapes.parse_heights(heights)
+    )
     contact = CompliantContact(layout)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
@@ -63,7 +65,7 @@ def plan(
             off = "" if np.isinf(error) else f", best within {error:.2f} mm"
             bar.update(task, description=f"planning … {tried} paths followed{off}")
 
-        start = find(shapes.numbers(begin.split(",")), layout, contact=contact).shape if begin else None
+        start = find(shapes.parse_heights(begin.split(",")), layout, contact=contact).shape if begin else None
         found = find(asked, layout, contact=contact, start=start, progress=report)
     if plot:
         from bubbleskin.plot.contact import plot_plan

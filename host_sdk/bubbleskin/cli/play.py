@@ -14,7 +14,7 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.library import LIBRARY
 from bubbleskin.sequence.model import Sequence
-from bubbleskin.sequence.player import Played, Playing
+from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus
 
 
 @click.command()
@@ -43,10 +43,10 @@ def play(what: str, loops: int | None, at: float | None, device: str | None, jso
             with Progress(*columns, console=console, transient=True, disable=json or not console.is_terminal) as bar:
                 task = bar.add_task(f"{sequence.name or what} …", total=None, step="upload")
 
-                def report(playing: Playing) -> None:
+                def report(playing: PlaybackStatus) -> None:
                     done = f"step {playing.step}{f', {playing.name}' if playing.name else ''}"
                     paused = " (paused)" if playing.state == "paused" else ""
-                    bar.update(task, completed=playing.played, total=playing.steps or None, step=done + paused)
+                    bar.update(task, completed=playing.begun_steps, total=playing.steps or None, step=done + paused)
 
                 played = skin.play(sequence, at=at, progress=report)
         except KeyboardInterrupt:
@@ -79,7 +79,7 @@ def _library(what: str, layout: Layout, loops: int | None) -> Sequence:
     return LIBRARY[what](layout) if loops is None else LIBRARY[what](layout, loops=loops)
 
 
-def _say(console: Console, sequence: Sequence, played: Played) -> None:
+def _say(console: Console, sequence: Sequence, played: PlaybackReport) -> None:
     seconds = played.ended - played.began[0] if played.began else 0.0
     console.print(
         f"Played {sequence.name or 'it'}: {len(played.steps)} steps in {seconds:.3f} s by the wristband's clock.",

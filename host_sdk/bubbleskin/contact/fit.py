@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
+from bubbleskin.checks import finite, number, positive
 from bubbleskin.contact.model import KBASE, KC, KXY, KZ, CompliantContact
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
-from bubbleskin.membrane.checks import finite, number, positive
 
 Array = NDArray[np.float64]
 

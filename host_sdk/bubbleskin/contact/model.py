@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bubbleskin.checks import finite, number, one_of, positive
 from bubbleskin.contact import energy as core
 from bubbleskin.contact.continuation import FINE, Outcome, PathFollower, Resolution, Snap, ramps
 from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
@@ -16,7 +17,6 @@ from bubbleskin.errors import InvalidInput, NoEquilibrium
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
 from bubbleskin.membrane.balloon import ATMOSPHERE
-from bubbleskin.membrane.checks import finite, number, one_of, positive
 
 Array = NDArray[np.float64]
 Ramp = Literal["pressure", "height"]
@@ -63,6 +63,11 @@ class Shape:
     converged: bool
     increments: int
     """Relaxations on the way here, halved increments included."""
+
+    def __repr__(self) -> str:
+        low, high = self.height_mm.min(), self.height_mm.max()
+        end = "settled" if self.converged else f"not at rest, {self.residual:.2g} N left"
+        return f"<Shape of {len(self)} bubbles, {low:.2f} to {high:.2f} mm, {len(self.contacts)} contacts, {end}>"
 
     def __len__(self) -> int:
         return len(self.height_mm)
@@ -113,6 +118,9 @@ class CompliantContact:
             raise InvalidInput(
                 f"Bubbles {close[0][0]} and {close[0][1]} are in one place; the layout must keep them apart."
             )
+
+    def __repr__(self) -> str:
+        return f"<CompliantContact of {len(self)} bubbles>"
 
     def __len__(self) -> int:
         return len(self.layout)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bubbleskin.checks import finite, number, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.membrane.checks import finite, number, positive
 
 Array = NDArray[np.float64]
 
@@ -48,6 +48,9 @@ class RigidContact:
         np.fill_diagonal(self._distance, np.inf)
         if (self._distance < 2 * rest_radius_mm - 1e-9).any():
             raise InvalidInput(f"Bubbles of {rest_radius_mm:g} mm radius do not fit this layout even at rest.")
+
+    def __repr__(self) -> str:
+        return f"<RigidContact of {len(self.layout)} bubbles>"
 
     def limits(self, radius_mm: ArrayLike) -> Limits:
         """How large each bubble may be while the others have `radius_mm`, (n,)."""

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from bubbleskin.device.records import Info
+from bubbleskin.async_skin import AsyncSkin
+from bubbleskin.device.info import Info
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError, WrongDevice
 from bubbleskin.flash import drive as drives
 from bubbleskin.flash import mpy, slots, uf2
@@ -13,7 +14,7 @@ from bubbleskin.flash.kept import Kept, UnderWay
 from bubbleskin.flash.machine import Connection, Machine
 from bubbleskin.flash.prompt import Prompt
 from bubbleskin.link.link import run_sync
-from bubbleskin.skin import AsyncSkin, Skin
+from bubbleskin.skin import Skin
 from bubbleskin.toolchain.rp2040 import BOARDS, firmware
 
 _HELLO_S = 1.5  # for one attempt

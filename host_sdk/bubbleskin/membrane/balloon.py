@@ -1,7 +1,7 @@
 """One inflatable bubble: a spherical Yeoh membrane, with a thin or an exactly thick wall.
 
 The formulas of the wall are plain functions of numbers (:func:`yeoh_pressure` here, the rest in
-:mod:`~bubbleskin.membrane.wall`); :class:`YeohBalloon` holds one bubble's figures and asks them.
+:mod:`~bubbleskin.membrane.wall`); :class:`YeohBalloon` holds one bubble's constants and sizes and asks them.
 """
 
 from __future__ import annotations
@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from bubbleskin.checks import Numbers, finite, like, number, one_of, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane import wall as walls
 from bubbleskin.membrane.branches import MonotonePieces
-from bubbleskin.membrane.checks import finite, like, number, one_of, positive
 
 ATMOSPHERE = 101_325.0
 """Standard ambient pressure in Pa; gauge pressures are above it."""
@@ -62,7 +63,7 @@ class Jump(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class YeohBalloon:
-    """One spherical bubble of Yeoh material. All figures SI; every method takes scalars or arrays.
+    """One spherical bubble of Yeoh material. All SI; every method takes scalars or arrays.
 
     The defaults are the paper's fit and sizes. ``mu`` is the small-strain shear modulus μ (Pa) of
     W = μ/2 (I−3) + C2 (I−3)² + C3 (I−3)³, so C1 = μ/2 and Young's modulus is 3μ;
@@ -73,7 +74,7 @@ class YeohBalloon:
     height is the *outer* diameter, and "stretch" is that of the named surface: 5 mm inner, mid or outer
     diameter are three different bubbles (19.1, 28.1 and 56.2 kPa at a height of 12 mm).
 
-    Raises :class:`~bubbleskin.errors.InvalidInput` for figures that no bubble has, most often a unit slip.
+    Raises :class:`~bubbleskin.errors.InvalidInput` for constants and sizes that no bubble has, most often a unit slip.
     """
 
     mu: float = 39.62e3
@@ -132,7 +133,7 @@ class YeohBalloon:
         diameter_is: Surface = "mid",
         wall: Wall = "thin",
     ) -> YeohBalloon:
-        """Build a bubble from figures that carry their unit and their meaning in the name.
+        """Build a bubble from numbers that carry their unit and their meaning in the name.
 
         Give exactly one stiffness: the shear modulus ``mu_kpa``, the first Yeoh constant ``c1_kpa`` = μ/2,
         or Young's modulus ``young_kpa`` = 3μ. ``diameter_mm`` is the rest diameter of the surface that
@@ -157,7 +158,7 @@ class YeohBalloon:
             surface=diameter_is,
         )
 
-    # The figures, in other words.
+    # The same constants and sizes by other names.
 
     @property
     def c1(self) -> float:
@@ -197,36 +198,36 @@ class YeohBalloon:
 
     # Functions of the state.
 
-    def pressure(self, stretch: Any) -> Any:
+    def pressure(self, stretch: Numbers) -> Numbers:
         """Gauge pressure (Pa) in equilibrium at ``stretch`` (> 0; below 1 it is suction). Paper, Eq. 7."""
         return like(stretch, self._pressure(self._stretch(stretch)))
 
-    def slope(self, stretch: Any) -> Any:
+    def slope(self, stretch: Numbers) -> Numbers:
         """dP/dλ (Pa) at ``stretch``: positive where a pressure-controlled bubble is stable."""
         return like(stretch, self._slope(self._stretch(stretch)))
 
-    def compliance(self, stretch: Any) -> Any:
+    def compliance(self, stretch: Numbers) -> Numbers:
         """dh/dP (m/Pa; 1e-6 m/Pa is 1 mm/kPa) at ``stretch``; unbounded at a limit point."""
         x = self._stretch(stretch)
         with np.errstate(divide="ignore"):
             return like(stretch, self._height_slope(x) / self._slope(x))
 
-    def volume(self, stretch: Any) -> Any:
+    def volume(self, stretch: Numbers) -> Numbers:
         """Enclosed air (m³) at ``stretch``: 4/3 π r³, of the inner surface if the wall is thick."""
         inner, _ = self._current_radii(self._stretch(stretch))
         return like(stretch, 4 / 3 * math.pi * inner**3)
 
-    def energy(self, stretch: Any) -> Any:
+    def energy(self, stretch: Numbers) -> Numbers:
         """Strain energy (J) of the whole wall at ``stretch``; dU/dV is the pressure."""
         x = self._stretch(stretch)
-        return like(stretch, walls.energy(x, *self._figures))
+        return like(stretch, walls.energy(x, *self._arguments))
 
-    def height(self, stretch: Any) -> Any:
+    def height(self, stretch: Numbers) -> Numbers:
         """Height above the base plane (m): the outer diameter of the sphere that sits on it."""
         _, outer = self._current_radii(self._stretch(stretch))
         return like(stretch, 2 * outer)
 
-    def stretch_at_height(self, height: Any) -> Any:
+    def stretch_at_height(self, height: Numbers) -> Numbers:
         """Stretch of the named surface when the bubble is ``height`` (m) tall, from the rest height up."""
         h = positive("height", height, "m")
         if np.any(h < self.rest_height * (1 - 1e-9)):
@@ -234,13 +235,21 @@ class YeohBalloon:
                 f"a height of {np.min(h) * 1e3:g} mm is below the rest height of "
                 f"{self.rest_height * 1e3:g} mm: a bubble without pressure is already that tall."
             )
-        return like(height, walls.stretch_of_outer(h / 2, *self._figures[3:]))
+        return like(height, walls.stretch_of_outer(h / 2, *self._sizes))
 
-    def pressure_at_height(self, height: Any) -> Any:
+    def pressure_at_height(self, height: Numbers) -> Numbers:
         """Gauge pressure (Pa) that holds the bubble at ``height`` (m). Always single valued."""
         return like(height, self._pressure(np.asarray(self.stretch_at_height(height))))
 
-    def is_stable(self, stretch: Any, *, line_volume: float = math.inf, polytropic: float = 1.0) -> Any:
+    @overload
+    def is_stable(self, stretch: float, *, line_volume: float = math.inf, polytropic: float = 1.0) -> bool: ...
+    @overload
+    def is_stable(
+        self, stretch: NDArray[np.float64], *, line_volume: float = math.inf, polytropic: float = 1.0
+    ) -> NDArray[np.bool_]: ...
+    def is_stable(
+        self, stretch: ArrayLike, *, line_volume: float = math.inf, polytropic: float = 1.0
+    ) -> bool | NDArray[np.bool_]:
         """Whether the state stays where it is when nudged.
 
         By default behind a pressure regulator: stable where dP/dλ > 0. With a finite ``line_volume`` (m³)
@@ -250,14 +259,14 @@ class YeohBalloon:
         x = self._stretch(stretch)
         inner, _ = self._current_radii(x)
         V = 4 / 3 * math.pi * inner**3
-        dV = 4 * math.pi * inner**2 * walls.radius_slope(x, *self._figures[3:])[0]
+        dV = 4 * math.pi * inner**2 * walls.radius_slope(x, *self._sizes)[0]
         air = polytropic * (ATMOSPHERE + self._pressure(x)) / (V + line_volume)
         stable = self._slope(x) / dV + air > 0
         return bool(stable) if np.ndim(stretch) == 0 else stable
 
     # Functions of the pressure: as many answers as there are branches.
 
-    def stretches(self, pressure: Any) -> Any:
+    def stretches(self, pressure: ArrayLike) -> NDArray[np.float64]:
         """All stretches ≥ 1 in equilibrium at ``pressure`` (Pa, gauge), ascending.
 
         A scalar gives a 1-D array with one entry per branch (1 to 3). An array of shape s gives s + (k,),
@@ -279,7 +288,7 @@ class YeohBalloon:
         found = pieces.solve(np.atleast_1d(p))
         return found[0][~np.isnan(found[0])] if np.ndim(pressure) == 0 else found
 
-    def heights(self, pressure: Any) -> Any:
+    def heights(self, pressure: ArrayLike) -> NDArray[np.float64]:
         """All heights (m) in equilibrium at ``pressure``, ascending; else as :meth:`stretches`."""
         _, outer = self._current_radii(self.stretches(pressure))
         return 2 * outer
@@ -323,11 +332,15 @@ class YeohBalloon:
         margin = 1e-9 * (top - bottom)
         return float(brentq(excess, max(bottom, 0.0) + margin, top - margin, xtol=1e-9))
 
-    # Inside: no checks, arrays only.
+    # Without checks, arrays only.
 
     @property
-    def _figures(self) -> tuple[float, float, float, float, float, Wall, Surface]:
-        return self.mu, self.c2, self.c3, self.thickness, self.radius, self.wall, self.surface
+    def _arguments(self) -> tuple[float, float, float, float, float, Wall, Surface]:
+        return self.mu, self.c2, self.c3, *self._sizes
+
+    @property
+    def _sizes(self) -> tuple[float, float, Wall, Surface]:
+        return self.thickness, self.radius, self.wall, self.surface
 
     @cached_property
     def _pieces(self) -> MonotonePieces:
@@ -335,7 +348,7 @@ class YeohBalloon:
 
     def _stretch(self, stretch: Any) -> np.ndarray:
         x = positive("stretch", stretch, "")
-        smallest = walls.least_stretch(*self._figures[3:])
+        smallest = walls.least_stretch(*self._sizes)
         if np.any(x <= smallest):
             raise InvalidInput(
                 f"a stretch of {np.min(x):g} would close this thick bubble: it must be above {smallest:.4f}."
@@ -345,13 +358,13 @@ class YeohBalloon:
     def _pressure(self, x: np.ndarray) -> np.ndarray:
         if self.wall == "thin":
             return np.asarray(yeoh_pressure(x, self.mu, self.c2, self.c3, self.thickness, self.radius))
-        return walls.thick_pressure(x, *self._figures)
+        return walls.thick_pressure(x, *self._arguments)
 
     def _slope(self, x: np.ndarray) -> np.ndarray:
-        return walls.slope(x, *self._figures)
+        return walls.slope(x, *self._arguments)
 
     def _height_slope(self, x: np.ndarray) -> np.ndarray:
-        return 2 * walls.radius_slope(x, *self._figures[3:])[1]
+        return 2 * walls.radius_slope(x, *self._sizes)[1]
 
     def _current_radii(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return walls.current_radii(x, *self._figures[3:])
+        return walls.current_radii(x, *self._sizes)

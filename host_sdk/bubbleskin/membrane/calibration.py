@@ -1,7 +1,7 @@
 """The calibration of one wristband: a table per bubble, in a text file that a person can read and diff.
 
 The file is TOML. Every knot has its own line, so a diff shows which height moved by how many Pa; the
-constants behind each table are kept beside it, with their units and where they come from. The CRC-32 over
+constants behind each table stand beside it, with their units and where they come from. The CRC-32 over
 all tables is the one that the firmware reports.
 """
 
@@ -48,6 +48,9 @@ class Calibration:
             raise InvalidInput("a calibration needs at least one balloon.")
         tables = (build_table(balloon, height_mm=height_mm, knots=knots) for balloon in balloons)
         return cls(board, tuple(tables), source)
+
+    def __repr__(self) -> str:
+        return f"<Calibration of a {self.board}: {len(self.tables)} tables, CRC-32 {self.crc32:08x}>"
 
     @property
     def crc32(self) -> int:

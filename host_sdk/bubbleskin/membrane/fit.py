@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
+from bubbleskin.checks import Numbers, finite, like, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon
-from bubbleskin.membrane.checks import finite, like, positive
-from bubbleskin.membrane.regression import Points, Shape, Solution, regress
+from bubbleskin.membrane.regression import Dimensions, Points, Solution, regress
 
 HEIGHT_SD = 0.05e-3
 """Standard deviation (m) assumed of a height when none is given."""
@@ -21,9 +21,23 @@ PRESSURE_SD = 150.0
 """Standard deviation (Pa) assumed of a pressure when none is given."""
 
 LEAST_POINTS = 4
-CONDITION_LIMIT = 30.0  # data over 5-14 mm has 10 to 20, data from the plateau alone 35 to 60
-WIDTH_LIMIT = 0.05  # of the pressure: a wider 95 % band somewhere in 6-14 mm is worth a warning
+CONDITION_LIMIT = 30.0
+"""Of the design matrix: data over 5-14 mm has 10 to 20, data from the plateau alone 35 to 60."""
+WIDTH_LIMIT = 0.05
+"""Share of the pressure: a wider 95 % band somewhere in 6-14 mm is worth a warning."""
 LACK_OF_FIT_LEVEL = 0.01
+"""Repeats that agree so improbably well speak against the model."""
+
+
+class Noise(NamedTuple):
+    """What is known beforehand of the errors of measured points; scalars or one entry per point, (n,)."""
+
+    height_sd: Any = HEIGHT_SD
+    """Standard deviation, m."""
+    pressure_sd: Any = PRESSURE_SD
+    """Standard deviation, Pa."""
+    outliers: bool = True
+    """Whether some points may be far off; they are then found and left out."""
 
 
 class IdentifiabilityWarning(UserWarning):
@@ -45,10 +59,14 @@ class Parameters(NamedTuple):
 class Repeats(NamedTuple):
     """What repeated settings (triplicates) say about the noise; see :func:`fit_yeoh`."""
 
-    height_sd: float  # m, between repeats of one setting
-    pressure_sd: float  # Pa
+    height_sd: float
+    """m, between repeats of one setting."""
+    pressure_sd: float
+    """Pa, between repeats of one setting."""
     settings: int
-    p_value: float  # of the settings' means lying where the model says; small means they do not
+    """How many there are."""
+    p_value: float
+    """Of the settings' means lying where the model says; small means that they do not."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +89,16 @@ class YeohFit:
     dof: float
     repeats: Repeats | None = None
     notes: tuple[str, ...] = ()
-    shape: Shape = field(repr=False, kw_only=True)
+    dimensions: Dimensions = field(repr=False, kw_only=True)
 
     @property
     def balloons(self) -> list[YeohBalloon]:
         """The fitted balloon in a list, as a sheet's fit has several."""
         return [self.balloon]
+
+    def __repr__(self) -> str:
+        mu, c2, c3 = self.parameters
+        return f"<YeohFit of {self.residuals.size} points: mu {mu / 1e3:.4g} kPa, C2 {c2:.4g} Pa, C3 {c3:.4g} Pa>"
 
     def interval(self, level: float = 0.95) -> np.ndarray:
         """Confidence interval of each constant, (3, 2) in Pa; C3's is cut off at 0."""
@@ -85,20 +107,20 @@ class YeohFit:
         ends[2] = np.maximum(ends[2], 0.0)
         return ends
 
-    def pressure_sd(self, height: Any) -> Any:
+    def pressure_sd(self, height: Numbers) -> Numbers:
         """Standard deviation (Pa) of the model's pressure at ``height`` (m)."""
         h = positive("height", height, "m")
-        basis, _ = self.shape.basis(np.atleast_1d(h).ravel())
+        basis, _ = self.dimensions.basis(np.atleast_1d(h).ravel())
         sd = np.sqrt(np.einsum("ij,jk,ik->i", basis, self.covariance, basis)).reshape(np.shape(h))
         return like(height, sd)
 
-    def pressure_band(self, height: Any, level: float = 0.95) -> tuple[Any, Any]:
+    def pressure_band(self, height: Numbers, level: float = 0.95) -> tuple[Numbers, Numbers]:
         """Lowest and highest pressure (Pa) of the model at ``height`` (m) that the data allows."""
         middle = self.balloon.pressure_at_height(height)
         half = self._quantile(level) * self.pressure_sd(height)
         return middle - half, middle + half
 
-    def height_band(self, pressure: Any, level: float = 0.95, *, up_to: float = 0.0) -> tuple[Any, Any]:
+    def height_band(self, pressure: Numbers, level: float = 0.95, *, up_to: float = 0.0) -> tuple[Numbers, Numbers]:
         """Lowest and highest height (m) at ``pressure`` (Pa) that the data allows.
 
         All heights whose pressure band holds the pressure are allowed, so on a plateau, or across a snap,
@@ -134,10 +156,10 @@ class YeohFit:
             **{f"{name}_pa": value for name, value in self.parameters._asdict().items()},
             **{f"{name}_95_pa": list(map(float, ends[k])) for k, name in enumerate(Parameters._fields)},
             "covariance_pa2": self.covariance.tolist(),
-            "thickness_mm": self.shape.thickness * 1e3,
-            "diameter_mm": self.shape.radius * 2e3,
-            "diameter_is": self.shape.surface,
-            "wall": self.shape.wall,
+            "thickness_mm": self.dimensions.thickness * 1e3,
+            "diameter_mm": self.dimensions.radius * 2e3,
+            "diameter_is": self.dimensions.surface,
+            "wall": self.dimensions.wall,
             "points": int(self.residuals.size),
             "outliers": np.flatnonzero(self.outliers).tolist(),
             "noise_found_over_stated": self.scale,
@@ -159,35 +181,33 @@ def fit_yeoh(
     thickness: float = 1e-3,
     wall: Wall = "thin",
     surface: Surface = "mid",
-    height_sd: Any = HEIGHT_SD,
-    pressure_sd: Any = PRESSURE_SD,
-    robust: bool = True,
+    noise: Noise = Noise(),  # noqa: B008 - a tuple does not change
     step: Any = None,
 ) -> YeohFit:
     """Fit μ, C2, C3 to points (``height`` m, ``pressure`` Pa gauge), (n,) each, n ≥ 4.
 
     The points may come from one bubble or, pooled, from many; :func:`fit_sheet` fits each by itself.
     ``radius``, ``thickness``, ``wall`` and ``surface`` are taken as given, as :class:`YeohBalloon` has them.
-    Noise is in both axes; only the ratio of ``height_sd`` (m) to ``pressure_sd`` (Pa), scalars or (n,),
-    matters, for its size is found from the residuals. ``robust`` leaves out points that noise would put
-    so far off the curve once in 16000 times. C3 is kept ≥ 0.
+    Noise is in both axes; only the ratio of its two standard deviations matters, for its size is found from
+    the residuals. Outliers are points that noise would put so far off the curve once in 16000 times. C3 stays
+    ≥ 0.
 
     ``step`` (n,) names the setting of each point, and points of one setting are repeats (triplicates).
     If they agree with each other much better than with the model, the model is at fault, not the noise:
-    that is said and the covariance is widened to cover it.
+    a note says so and the covariance is widened to cover it.
 
     Warns :class:`IdentifiabilityWarning` when the data (all on the plateau, say) leaves the curve between
     6 and 14 mm open. Raises ``InvalidInput`` for too few or impossible points.
     """
-    shape = Shape(radius, thickness, wall, surface)
-    shape.balloon(np.array([YeohBalloon.mu, YeohBalloon.c2, YeohBalloon.c3]))  # refuses impossible sizes
-    points = as_points(height, pressure, height_sd, pressure_sd)
+    dimensions = Dimensions(radius, thickness, wall, surface)
+    dimensions.balloon(np.array([YeohBalloon.mu, YeohBalloon.c2, YeohBalloon.c3]))  # Refuses impossible sizes.
+    points = as_points(height, pressure, noise)
     if len(points) < LEAST_POINTS:
         raise InvalidInput(
             f"{len(points)} points cannot fix three constants and their uncertainty: give at least "
             f"{LEAST_POINTS}, better 12 or more from just above rest up to 12 mm."
         )
-    solution = regress(shape, points, robust=robust)
+    solution = regress(dimensions, points, robust=noise.outliers)
     linear = solution.linear
     distances = linear.residuals(solution.theta)
     variance = solution.scale**2
@@ -206,7 +226,7 @@ def fit_yeoh(
             notes.append(note)
             warnings.warn(note, LackOfFitWarning, stacklevel=2)
     covariance = variance * inverse(linear.design.T @ (linear.design * solution.weights[:, None]))
-    fit = finish(shape, points, solution.theta, covariance, distances, solution, dof, repeats, tuple(notes))
+    fit = replace(make_fit(dimensions, points, solution, covariance, dof), repeats=repeats, notes=tuple(notes))
     condition = float(np.linalg.cond(linear.design / np.linalg.norm(linear.design, axis=0)))
     doubt = open_constants(fit, points, condition)
     if doubt:
@@ -215,7 +235,7 @@ def fit_yeoh(
     return fit
 
 
-def as_points(height: Any, pressure: Any, height_sd: Any, pressure_sd: Any) -> Points:
+def as_points(height: Any, pressure: Any, noise: Noise) -> Points:
     """Check measured points and give each its own noise."""
     h, p = np.atleast_1d(positive("height", height, "m")), np.atleast_1d(finite("pressure", pressure))
     if h.ndim != 1 or h.shape != p.shape:
@@ -228,7 +248,7 @@ def as_points(height: Any, pressure: Any, height_sd: Any, pressure_sd: Any) -> P
             "mm by 1000, or read the file with read_csv, which knows units."
         )
     sds = []
-    for name, value, unit in (("height_sd", height_sd, "m"), ("pressure_sd", pressure_sd, "Pa")):
+    for name, value, unit in (("height_sd", noise.height_sd, "m"), ("pressure_sd", noise.pressure_sd, "Pa")):
         sd = positive(name, value, unit)
         if sd.ndim and sd.shape != h.shape:
             raise InvalidInput(f"{name} must be one number or one per point ({h.size}), not {sd.size}.")
@@ -243,31 +263,19 @@ def as_points(height: Any, pressure: Any, height_sd: Any, pressure_sd: Any) -> P
     return Points(h, p, sds[0], sds[1])
 
 
-def finish(
-    shape: Shape,
-    points: Points,
-    theta: np.ndarray,
-    covariance: np.ndarray,
-    distances: np.ndarray,
-    solution: Solution,
-    dof: float,
-    repeats: Repeats | None = None,
-    notes: tuple[str, ...] = (),
-) -> YeohFit:
-    """Gather what is known about a fitted bubble."""
-    residuals = points.pressure - shape.basis(shape.at_least(points.height))[0] @ theta
+def make_fit(dimensions: Dimensions, points: Points, solution: Solution, covariance: np.ndarray, dof: float) -> YeohFit:
+    """What is known about one fitted bubble: ``covariance`` (3, 3) in Pa² of its constants, with ``dof`` degrees of freedom."""
+    theta = solution.theta
     return YeohFit(
-        shape.balloon(theta),
-        Parameters(*(float(v) for v in theta)),
+        dimensions.balloon(theta),
+        Parameters(*(float(value) for value in theta)),
         covariance,
-        residuals,
-        distances,
+        points.pressure - dimensions.basis(dimensions.at_least(points.height))[0] @ theta,
+        solution.linear.residuals(theta),
         solution.weights == 0,
         solution.scale,
         dof,
-        repeats,
-        notes,
-        shape=shape,
+        dimensions=dimensions,
     )
 
 
@@ -283,10 +291,10 @@ def _repeats(
     """Noise between repeats, and the variance of the settings' means about the curve per repeat."""
     if step.shape != distances.shape:
         raise InvalidInput(f"step must name the setting of each of the {distances.size} points.")
-    kept = solution.weights > 0
-    _, group = np.unique(step[kept], return_inverse=True)
+    good = solution.weights > 0
+    _, group = np.unique(step[good], return_inverse=True)
     count = np.bincount(group)
-    inner = int(kept.sum() - count.size)
+    inner = int(good.sum() - count.size)
     if count.size <= 3 or inner < count.size // 2:
         return None, 0.0
 
@@ -294,11 +302,11 @@ def _repeats(
         deviation = values - (np.bincount(group, values) / count)[group]
         return float(np.sum(deviation**2) / inner)
 
-    means = np.bincount(group, distances[kept]) / count
+    means = np.bincount(group, distances[good]) / count
     between = float(np.sum(count * means**2) / (count.size - 3))
-    within = max(scatter(distances[kept]), 1e-12)
+    within = max(scatter(distances[good]), 1e-12)
     p_value = float(stats.f.sf(between / within, count.size - 3, inner))
-    spread = np.sqrt(scatter(points.height[kept])), np.sqrt(scatter(points.pressure[kept]))
+    spread = np.sqrt(scatter(points.height[good])), np.sqrt(scatter(points.pressure[good]))
     return Repeats(float(spread[0]), float(spread[1]), int(count.size), p_value), between
 
 

@@ -19,18 +19,21 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane import wall as walls
 from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon, yeoh_pressure
 
-HUBER = 1.345  # standard deviations; these two give 95 % efficiency on clean Gaussian noise
-BISQUARE = 4.685
-LOST = 6e-5  # of good points are taken for outliers: with many points those beyond 4 standard deviations
+HUBER, BISQUARE = 1.345, 4.685
+"""Standard deviations: with these the weights are 95 % efficient on clean Gaussian noise."""
+LOST = 6e-5
+"""Share of good points that is taken for outliers: with many points those beyond 4 standard deviations."""
 PASSES = 60
-LEAST_CHANGE = 1e-7  # Relative, of θ: a smaller one ends the passes.
+"""Of the iteration, at most."""
+LEAST_CHANGE = 1e-7
+"""Relative, of θ: a smaller one ends the passes."""
 
 _UNIT = np.eye(3)[:, :, None]  # θ = (1,0,0), (0,1,0), (0,0,1), to broadcast over points
 
 
 @dataclass(frozen=True)
-class Shape:
-    """What the fit takes as given: the rest sizes of the bubble and the kind of its wall."""
+class Dimensions:
+    """What the fit takes as given: the rest sizes of the bubble (m) and the kind of its wall."""
 
     radius: float
     thickness: float
@@ -38,7 +41,7 @@ class Shape:
     surface: Surface
 
     def balloon(self, theta: np.ndarray) -> YeohBalloon:
-        """The bubble of this shape made of the material ``theta``."""
+        """The bubble of these dimensions made of the material ``theta``."""
         mu, c2, c3 = (float(v) for v in theta)
         return YeohBalloon(
             mu=mu, c2=c2, c3=c3, thickness=self.thickness, radius=self.radius, wall=self.wall,
@@ -51,7 +54,7 @@ class Shape:
         return 2 * walls.rest_radii(self.thickness, self.radius, self.wall, self.surface)[1]
 
     def at_least(self, height: np.ndarray) -> np.ndarray:
-        """Heights kept where the formulas hold: noise may put a point a little below rest, not into the wall."""
+        """Heights moved to where the formulas hold: noise may put a point a little below rest, not into the wall."""
         return np.maximum(height, 0.97 * self.rest_height)
 
     def basis(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -87,8 +90,10 @@ class Points:
 class Linear(NamedTuple):
     """The regression problem as seen from one θ: rows of ``design`` against ``target``, unit noise."""
 
-    design: np.ndarray  # (n, 3)
-    target: np.ndarray  # (n,)
+    design: np.ndarray
+    """(n, 3)."""
+    target: np.ndarray
+    """(n,)."""
 
     def residuals(self, theta: np.ndarray) -> np.ndarray:
         """Signed distances from the curve in units of the noise."""
@@ -99,52 +104,55 @@ class Solution(NamedTuple):
     """Where the passes ended."""
 
     theta: np.ndarray
+    """(3,), Pa."""
     linear: Linear
-    weights: np.ndarray  # of each point, 0 (ignored) to 1
-    scale: float  # noise found, in units of the noise stated
+    weights: np.ndarray
+    """Of each point, 0 (left out) to 1, (n,)."""
+    scale: float
+    """Noise found, in units of the noise stated."""
 
 
-def start(shape: Shape, points: Points) -> np.ndarray:
+def start(dimensions: Dimensions, points: Points) -> np.ndarray:
     """The paper's material scaled by the median of measured over expected pressure."""
     theta = np.array([YeohBalloon.mu, YeohBalloon.c2, YeohBalloon.c3])
-    sunk = points.height < 0.9 * shape.rest_height
+    sunk = points.height < 0.9 * dimensions.rest_height
     if sunk.any():
         k = int(np.argmax(sunk))
         raise InvalidInput(
             f"point {k} is {points.height[k] * 1e3:g} mm tall, but a bubble of this diameter is "
-            f"{shape.rest_height * 1e3:g} mm tall at rest: check the units, the diameter, and of which surface it is."
+            f"{dimensions.rest_height * 1e3:g} mm tall at rest: check the units, the diameter, and of which surface it is."
         )
-    lifted = points.height > 1.05 * shape.rest_height
+    lifted = points.height > 1.05 * dimensions.rest_height
     if not lifted.any():
         raise InvalidInput(
-            f"no point is more than 5 % above the rest height of {shape.rest_height * 1e3:g} mm: "
+            f"no point is more than 5 % above the rest height of {dimensions.rest_height * 1e3:g} mm: "
             "there is no inflation to fit. Check the units and the diameter."
         )
-    expected = shape.basis(points.height[lifted])[0] @ theta
+    expected = dimensions.basis(points.height[lifted])[0] @ theta
     ratio = float(np.median(points.pressure[lifted] / expected))
     if ratio <= 0:
         raise InvalidInput("more than half of the pressures are zero or negative: there is nothing to fit.")
     return theta * ratio
 
 
-def project(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) -> np.ndarray:
+def project(dimensions: Dimensions, points: Points, theta: np.ndarray, eta: np.ndarray) -> np.ndarray:
     """The place on the curve nearest to each point, from the guess ``eta``, in heights (m).
 
     ``theta`` is (3,) for points of one curve, (n, 3) if each point has its own.
     """
     for _ in range(3):
-        basis, slopes = shape.basis(eta)
+        basis, slopes = dimensions.basis(eta)
         P, dP = (basis * theta).sum(axis=1), (slopes * theta).sum(axis=1)
         gradient = (eta - points.height) / points.height_sd**2 + (P - points.pressure) * dP / points.pressure_sd**2
         curvature = 1 / points.height_sd**2 + (dP / points.pressure_sd) ** 2
-        step = np.clip(gradient / curvature, -0.1 * shape.rest_height, 0.1 * shape.rest_height)
-        eta = shape.at_least(eta - step)
+        step = np.clip(gradient / curvature, -0.1 * dimensions.rest_height, 0.1 * dimensions.rest_height)
+        eta = dimensions.at_least(eta - step)
     return eta
 
 
-def linearise(shape: Shape, points: Points, theta: np.ndarray, eta: np.ndarray) -> Linear:
+def linearise(dimensions: Dimensions, points: Points, theta: np.ndarray, eta: np.ndarray) -> Linear:
     """The problem with each point carried along the tangent to its place ``eta`` on the curve."""
-    basis, slopes = shape.basis(eta)
+    basis, slopes = dimensions.basis(eta)
     dP = (slopes * theta).sum(axis=1)
     sd = np.sqrt(points.pressure_sd**2 + (dP * points.height_sd) ** 2)
     return Linear(basis / sd[:, None], (points.pressure + dP * (eta - points.height)) / sd)
@@ -186,31 +194,31 @@ def bisquare(u: np.ndarray) -> np.ndarray:
     return np.clip(1 - (u / BISQUARE) ** 2, 0, None) ** 2
 
 
-def within(residuals: np.ndarray, scale: float, fitted: float = 3) -> np.ndarray:
-    """1 for good points, 0 for outliers; at least 4 are kept.
+def good_points(residuals: np.ndarray, scale: float, fitted: float = 3) -> np.ndarray:
+    """1 for good points, 0 for outliers; at least 4 are good.
 
     The fewer the points, the less is known of the scale, and the further out a point must be.
     """
     cut = float(stats.t.isf(LOST / 2, max(residuals.size - fitted, 1.0)))
-    kept = np.abs(residuals) <= cut * scale
-    if kept.sum() < 4:
-        kept[np.argsort(np.abs(residuals))[:4]] = True
-    return kept.astype(float)
+    good = np.abs(residuals) <= cut * scale
+    if good.sum() < 4:
+        good[np.argsort(np.abs(residuals))[:4]] = True
+    return good.astype(float)
 
 
-def kept_scale(residuals: np.ndarray, weights: np.ndarray, fitted: float = 3) -> float:
-    """Standard deviation of the points that ``weights`` keeps, for that many constants fitted."""
+def scale_of_good(residuals: np.ndarray, weights: np.ndarray, fitted: float = 3) -> float:
+    """Standard deviation of the points that ``weights`` leaves in, for that many constants fitted."""
     return max(float(np.sqrt(np.sum(weights * residuals**2) / max(np.sum(weights) - fitted, 1.0))), 1e-9)
 
 
-def regress(shape: Shape, points: Points, *, robust: bool) -> Solution:
+def regress(dimensions: Dimensions, points: Points, *, robust: bool) -> Solution:
     """Fit θ to ``points``: near by Huber's weights, nearer by bisquare ones, then without the outliers."""
-    theta, eta = start(shape, points), shape.at_least(points.height)
+    theta, eta = start(dimensions, points), dimensions.at_least(points.height)
     weights, scale = np.ones(len(points)), 1.0
     for stage in ("huber", "bisquare", "trim") if robust else ("plain",):
         for _ in range(PASSES):
-            eta = project(shape, points, theta, eta)
-            linear = linearise(shape, points, theta, eta)
+            eta = project(dimensions, points, theta, eta)
+            linear = linearise(dimensions, points, theta, eta)
             residuals = linear.residuals(theta)
             if stage == "huber":
                 scale = median_scale(residuals)
@@ -218,13 +226,13 @@ def regress(shape: Shape, points: Points, *, robust: bool) -> Solution:
             elif stage == "bisquare":
                 weights = bisquare(residuals / scale)
             elif stage == "trim":
-                weights = within(residuals, scale)
-                scale = kept_scale(residuals, weights)
+                weights = good_points(residuals, scale)
+                scale = scale_of_good(residuals, weights)
             new = solve_bounded(linear, weights)
             change = float(np.max(np.abs(new - theta) / (np.abs(new) + 1e-6 * new[0])))
             theta = new
             if change < (LEAST_CHANGE if stage in ("plain", "trim") else 1e-3):
                 break
-    eta = project(shape, points, theta, eta)
-    linear = linearise(shape, points, theta, eta)
-    return Solution(theta, linear, weights, kept_scale(linear.residuals(theta), weights))
+    eta = project(dimensions, points, theta, eta)
+    linear = linearise(dimensions, points, theta, eta)
+    return Solution(theta, linear, weights, scale_of_good(linear.residuals(theta), weights))

@@ -19,30 +19,29 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon
 from bubbleskin.membrane.data import Measurements
 from bubbleskin.membrane.fit import (
-    HEIGHT_SD,
     LEAST_POINTS,
-    PRESSURE_SD,
     IdentifiabilityWarning,
+    Noise,
     Parameters,
     YeohFit,
     as_points,
-    finish,
     fit_yeoh,
+    make_fit,
     open_constants,
 )
 from bubbleskin.membrane.regression import (
     PASSES,
+    Dimensions,
     Linear,
     Points,
-    Shape,
     Solution,
     bisquare,
+    good_points,
     huber,
     linearise,
     median_scale,
     project,
     start,
-    within,
 )
 
 STIFFNESS_SPREAD = 0.10
@@ -52,6 +51,7 @@ SHAPE_SPREAD = 0.05
 """And each constant by itself. Both only as strong as :data:`SUPPOSED` measured bubbles."""
 
 SUPPOSED = 3.0
+"""Measured bubbles that the two spreads above count as."""
 
 MEAN_SPREAD = 1.0
 """The sheet's mean is first supposed to be the paper's material, scaled, within 100 % of each constant."""
@@ -115,25 +115,25 @@ def fit_measurements(
     measurements: Measurements,
     *,
     pooled: bool = False,
-    height_sd: float = HEIGHT_SD,
-    pressure_sd: float = PRESSURE_SD,
+    noise: Noise = Noise(),  # noqa: B008 - a tuple does not change
     **options: Any,
 ) -> YeohFit | SheetFit:
     """Fit what a file holds: one bubble (or all ``pooled`` as one) as such, several as a sheet.
 
-    Noise given in the file goes before ``height_sd`` and ``pressure_sd``; ``options`` are those of
-    :func:`fit_yeoh`.
+    Standard deviations given in the file go before those of ``noise``; ``options`` are the sizes, as
+    :func:`fit_yeoh` has them.
     """
-    m = measurements
-    noise: dict[str, Any] = {
-        "height_sd": height_sd if m.height_sd is None else m.height_sd,
-        "pressure_sd": pressure_sd if m.pressure_sd is None else m.pressure_sd,
-    }
-    if len(m.bubbles) > 1 and not pooled:
-        return fit_sheet(m.bubble, m.height, m.pressure, **noise, **options)
+    given, heights, pressures = measurements, measurements.height, measurements.pressure
+    noise = Noise(
+        noise.height_sd if given.height_sd is None else given.height_sd,
+        noise.pressure_sd if given.pressure_sd is None else given.pressure_sd,
+        noise.outliers,
+    )
+    if len(given.bubbles) > 1 and not pooled:
+        return fit_sheet(given.bubble, heights, pressures, noise=noise, **options)
     # Steps of different bubbles are different settings.
-    step = None if m.step is None else m.step + m.bubble * (int(m.step.max()) + 1)
-    return fit_yeoh(m.height, m.pressure, step=step, **noise, **options)
+    step = None if given.step is None else given.step + given.bubble * (int(given.step.max()) + 1)
+    return fit_yeoh(heights, pressures, step=step, noise=noise, **options)
 
 
 def fit_sheet(
@@ -145,9 +145,7 @@ def fit_sheet(
     thickness: float = 1e-3,
     wall: Wall = "thin",
     surface: Surface = "mid",
-    height_sd: Any = HEIGHT_SD,
-    pressure_sd: Any = PRESSURE_SD,
-    robust: bool = True,
+    noise: Noise = Noise(),  # noqa: B008 - a tuple does not change
 ) -> SheetFit:
     """Fit every bubble of a sheet, the prior being what the others say.
 
@@ -155,16 +153,16 @@ def fit_sheet(
     may have as few as one point. Warns :class:`IdentifiabilityWarning` with the numbers of bubbles whose
     curve stays open between 6 and 14 mm. Raises ``InvalidInput`` if all together have too few points.
     """
-    shape = Shape(radius, thickness, wall, surface)
-    points = as_points(height, pressure, height_sd, pressure_sd)
+    dimensions = Dimensions(radius, thickness, wall, surface)
+    points = as_points(height, pressure, noise)
     number = np.asarray(bubble)
     if number.shape != points.height.shape:
         raise InvalidInput(f"bubble must number each of the {len(points)} points; it has {number.size} entries.")
     if len(points) < LEAST_POINTS:
         raise InvalidInput(f"{len(points)} points on the whole sheet are too few: give at least {LEAST_POINTS}.")
-    shape.balloon(start(shape, points))  # refuses impossible sizes and pressures
+    dimensions.balloon(start(dimensions, points))  # Refuses impossible sizes and pressures.
     numbers, index = np.unique(number, return_inverse=True)
-    sheet = _Sheet(shape, points, index, robust=robust)
+    sheet = _Sheet(dimensions, points, index, robust=noise.outliers)
     sheet.run()
     covariances = sheet.covariances()
     fits = {}
@@ -174,7 +172,7 @@ def fit_sheet(
         linear = Linear(sheet.linear.design[mine] / sheet.unit, sheet.linear.target[mine])
         solution = Solution(theta, linear, sheet.weights[mine], sheet.scale)
         own = points.of(mine)
-        fit = finish(shape, own, theta, covariances[k], sheet.distances[mine], solution, sheet.dof)
+        fit = make_fit(dimensions, own, solution, covariances[k], sheet.dof)
         doubt = open_constants(fit, own)
         fits[int(n)] = replace(fit, notes=(doubt,)) if doubt else fit
     doubtful = [n for n, fit in fits.items() if fit.notes]
@@ -195,12 +193,12 @@ class _Sheet:
     in units of ``unit``, so that the 3 × 3 matrices, one per bubble, are well scaled.
     """
 
-    def __init__(self, shape: Shape, points: Points, index: np.ndarray, *, robust: bool) -> None:
-        self.shape, self.points, self.index, self.robust = shape, points, index, robust
+    def __init__(self, dimensions: Dimensions, points: Points, index: np.ndarray, *, robust: bool) -> None:
+        self.dimensions, self.points, self.index, self.robust = dimensions, points, index, robust
         self.count = int(index.max()) + 1
         self.of = (index == np.arange(self.count)[:, None]).astype(float)
-        self.unit = start(shape, points)
-        self.eta = shape.at_least(points.height)
+        self.unit = start(dimensions, points)
+        self.eta = dimensions.at_least(points.height)
         self.supposed = np.full((3, 3), STIFFNESS_SPREAD**2) + SHAPE_SPREAD**2 * np.eye(3)
         self.mean, self.spread = np.ones(3), 4 * self.supposed
         self.phi = np.ones((self.count, 3))
@@ -220,8 +218,8 @@ class _Sheet:
 
     def _see(self) -> None:
         theta = (self.phi * self.unit)[self.index]
-        self.eta = project(self.shape, self.points, theta, self.eta)
-        linear = linearise(self.shape, self.points, theta, self.eta)
+        self.eta = project(self.dimensions, self.points, theta, self.eta)
+        linear = linearise(self.dimensions, self.points, theta, self.eta)
         self.linear = Linear(linear.design * self.unit, linear.target)
         self.distances = self.linear.residuals(self.phi[self.index])
 
@@ -233,7 +231,7 @@ class _Sheet:
             self.scale = float(np.sqrt((STATED + r.size * median_scale(r, 0) ** 2) / (STATED + r.size)))
             self.weights = weigh(r / self.scale)
         elif self.robust:
-            self.weights = within(r, self.scale, self.fitted)
+            self.weights = good_points(r, self.scale, self.fitted)
         self.dof = STATED + max(float(self.weights.sum()) - self.fitted, 0.0)
         if weigh is None or not self.robust:
             self.scale = float(np.sqrt((STATED + np.sum(self.weights * r**2)) / self.dof))

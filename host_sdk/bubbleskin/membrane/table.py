@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from bubbleskin.checks import finite
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import YeohBalloon
-from bubbleskin.membrane.checks import finite
 
 MAX_KNOTS = 64
-MAX_PRESSURE = 0xFFFF  # Pa, an unsigned 16-bit knot
-MAX_HEIGHT = 0xFFFF  # µm
+MAX_PRESSURE, MAX_HEIGHT = 0xFFFF, 0xFFFF
+"""Pa and µm: a knot is two unsigned 16-bit numbers."""
 
-PRESSURE_TOLERANCE = 2.0  # Pa; the looser of the two holds at every height
-HEIGHT_TOLERANCE = 5.0  # µm
+PRESSURE_TOLERANCE, HEIGHT_TOLERANCE = 2.0, 5.0
+"""Pa and µm: the looser of the two holds at every height."""
 
 
 class TableError(NamedTuple):
@@ -88,12 +89,20 @@ class Table:
     def __hash__(self) -> int:
         return self.crc32
 
+    def __repr__(self) -> str:
+        low, high = self.height_um[0] / 1000, self.height_um[-1] / 1000
+        return f"<Table of {len(self)} knots, {low:g} to {high:g} mm, up to {self.pressure_pa.max() / 1000:.2f} kPa>"
+
     def __len__(self) -> int:
         return int(self.height_um.size)
 
-    # What the firmware computes.
+    # What the firmware computes from it.
 
-    def pressure_at(self, height_um: Any) -> Any:
+    @overload
+    def pressure_at(self, height_um: float) -> int: ...
+    @overload
+    def pressure_at(self, height_um: NDArray[Any]) -> NDArray[np.int64]: ...
+    def pressure_at(self, height_um: ArrayLike) -> int | NDArray[np.int64]:
         """Pressure (Pa) at a height (µm), in integers: p0 + (p1 − p0)(h − h0) // (h1 − h0), floored.
 
         Below the first knot the first value, above the last one the last. Heights that are not whole are
@@ -106,7 +115,11 @@ class Table:
         p = p0 + (p1 - p0) * (h - h0) // (h1 - h0)
         return int(p) if np.ndim(height_um) == 0 else p
 
-    def slope_at(self, height_um: Any) -> Any:
+    @overload
+    def slope_at(self, height_um: float) -> int: ...
+    @overload
+    def slope_at(self, height_um: NDArray[Any]) -> NDArray[np.int64]: ...
+    def slope_at(self, height_um: ArrayLike) -> int | NDArray[np.int64]:
         """Slope of the segment in Pa per mm, floored, for feed-forward; 0 outside the table."""
         h, k = self._segment(height_um)
         rise = np.diff(self.pressure_pa)[k] * 1000 // np.diff(self.height_um)[k]

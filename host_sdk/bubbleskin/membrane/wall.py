@@ -63,7 +63,7 @@ def energy_density(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> n
 
 
 def energy_slope(x: np.ndarray, mu: Constant, c2: Constant, c3: Constant) -> np.ndarray:
-    """DW/dI (Pa) in equal biaxial stretch."""
+    """dW/dI (Pa) in equal biaxial stretch."""
     J = 2 * x * x + x**-4 - 3
     return (3 * c3 * J + 2 * c2) * J + mu / 2
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from bubbleskin.contact.model import Shape
 from bubbleskin.layout import Layout
 from bubbleskin.planner.orders import Order
-from bubbleskin.sequence import model as sequences
+from bubbleskin.sequence.model import Sequence
+from bubbleskin.sequence.steps import Settled, Step
 
 Array = NDArray[np.float64]
 
@@ -60,28 +61,32 @@ class Plan:
     tried: int
     """Paths followed to find it."""
 
+    def __repr__(self) -> str:
+        end = f"{self.layout.names(self.unreachable)} out of reach" if self.unreachable else "all within reach"
+        return f"<Plan for {len(self.layout)} bubbles: {len(self.steps)} steps, {end}, off by {self.error_mm:.2f} mm>"
+
     @property
     def error_mm(self) -> float:
         """Largest distance of a height from what was asked."""
         return float(np.abs(self.predicted_mm - self.asked_mm).max())
 
     @property
-    def sequence(self) -> sequences.Sequence:
+    def sequence(self) -> Sequence:
         """The plan as a `bubbleskin.Sequence`, each step held until it has settled."""
         return self.to_sequence()
 
-    def to_sequence(self, ramp: float = 1.0, tolerance_mm: float = 0.2, timeout_s: float = 3.0) -> sequences.Sequence:
+    def to_sequence(self, ramp: float = 1.0, tolerance_mm: float = 0.2, timeout_s: float = 3.0) -> Sequence:
         """As `sequence`: each step ramps for `ramp` seconds and goes on when settled, or after `timeout_s`.
 
         A slow ramp keeps to the plan: what it predicts is bubbles in equilibrium all the way.
         """
-        until = sequences.Settled(tolerance_mm=tolerance_mm, timeout_s=timeout_s)
+        until = Settled(tolerance_mm=tolerance_mm, timeout_s=timeout_s)
         count = len(self.steps)
         steps = [
-            sequences.Step(step.target_mm.tolist(), ramp=ramp, until=until, name=f"step {number} of {count}")
+            Step(step.target_mm.tolist(), ramp=ramp, until=until, name=f"step {number} of {count}")
             for number, step in enumerate(self.steps, 1)
         ]
-        return sequences.Sequence(steps, name="plan", layout=self.layout)
+        return Sequence(steps, name="plan", layout=self.layout)
 
     def explain(self) -> str:
         """The plan in sentences, one to a line: who goes when and why, what was corrected, what cannot be had."""

@@ -8,12 +8,12 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin.checks import number, positive
 from bubbleskin.contact.continuation import FINE, Resolution
 from bubbleskin.contact.model import CompliantContact, Shape, balloons_of
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
-from bubbleskin.membrane.checks import number, positive
 from bubbleskin.planner.inverse import GOAL_MM, correct
 from bubbleskin.planner.orders import Order, steps_of, three_groups, two_groups
 from bubbleskin.planner.plan import Plan, PlanStep

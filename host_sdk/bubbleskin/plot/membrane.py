@@ -126,7 +126,7 @@ def plot_table(table: Table) -> Figure:
 
 def figure_4(*, seed: int = 4) -> tuple[Figure, Measurements]:
     """The paper's Fig. 4, one bubble measured in triplicate with the fitted model, from a simulation."""
-    measurements, _ = simulate_sheet(1, spread=0.0, settings=15, heights_mm=(5.25, 12.6), seed=seed)
+    measurements, _ = simulate_sheet(1, spread=0.0, heights_mm=np.linspace(5.25, 12.6, 15), seed=seed)
     fit = fit_yeoh(measurements.height, measurements.pressure, step=measurements.step)
     title = "Height of one bubble, in triplicate (simulated measurements)"
     return plot_fit(fit, measurements, title=title), measurements
@@ -229,26 +229,26 @@ def _draw_band(axes: Axes, fit: YeohFit, top_mm: float) -> None:
 
 
 def _draw_points(axes: Axes, fit: YeohFit, measurements: Measurements, *, colour: str, marker: str, label: str) -> None:
-    kept = ~fit.outliers
+    good = ~fit.outliers
     out = measurements
-    axes.plot(out.pressure[~kept] / 1e3, out.height[~kept] * 1e3, "x", color=colour, ms=5, mew=1.2)
-    p, h, p_sd, h_sd = _settings(measurements, kept, fit)
+    axes.plot(out.pressure[~good] / 1e3, out.height[~good] * 1e3, "x", color=colour, ms=5, mew=1.2)
+    p, h, p_sd, h_sd = _settings(measurements, good, fit)
     axes.errorbar(
         p / 1e3, h * 1e3, xerr=p_sd / 1e3, yerr=h_sd * 1e3, fmt=marker, ms=3.2, color=colour, elinewidth=0.8,
         label=label,
     )  # fmt: skip
 
 
-def _settings(measurements: Measurements, kept: np.ndarray, fit: YeohFit) -> tuple[np.ndarray, ...]:
+def _settings(measurements: Measurements, good: np.ndarray, fit: YeohFit) -> tuple[np.ndarray, ...]:
     """Pressure and height of what is to be drawn, and the bar of each: means of repeats, or points."""
-    p, h = measurements.pressure[kept], measurements.height[kept]
+    p, h = measurements.pressure[good], measurements.height[good]
     if measurements.step is None:
         # The noise of a point: stated, times what the fit found.
-        p_sd = PRESSURE_SD if measurements.pressure_sd is None else measurements.pressure_sd[kept]
-        h_sd = HEIGHT_SD if measurements.height_sd is None else measurements.height_sd[kept]
+        p_sd = PRESSURE_SD if measurements.pressure_sd is None else measurements.pressure_sd[good]
+        h_sd = HEIGHT_SD if measurements.height_sd is None else measurements.height_sd[good]
         ones = np.ones(p.size) * fit.scale
         return p, h, p_sd * ones, h_sd * ones
-    _, group, count = np.unique(measurements.step[kept], return_inverse=True, return_counts=True)
+    _, group, count = np.unique(measurements.step[good], return_inverse=True, return_counts=True)
 
     def mean(values: np.ndarray) -> np.ndarray:
         return np.bincount(group, values) / count

@@ -8,7 +8,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from bubbleskin.device.records import Info, State
+from bubbleskin.device.info import Info
+from bubbleskin.device.state import State
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import Clock
 

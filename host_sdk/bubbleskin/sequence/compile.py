@@ -8,18 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubble_protocol import steps as wire
-from bubbleskin.device.records import Info
+from bubbleskin.device.info import Info
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.message import crc32
-from bubbleskin.sequence.model import EASINGS, THEN, After, Repeat, Sequence, Step
+from bubbleskin.sequence.model import Sequence
+from bubbleskin.sequence.steps import EASINGS, THEN, After, Repeat, Step
 
 _PLACE_MM = 0.5
 """How far a bubble may be from where a sequence wants it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Compiled:
     """Records, (m, words) of 16 bits, and which step each one is: -1 for a repeat or its end."""
 
     sequence: Sequence
@@ -27,8 +28,8 @@ class Program:
     steps: NDArray[np.int64]
 
     @classmethod
-    def of(cls, sequence: Sequence, info: Info, layout: Layout) -> "Program":
-        """The program for that board. `InvalidInput` where the sequence is for another or beyond its limits."""
+    def of(cls, sequence: Sequence, info: Info, layout: Layout) -> "Compiled":
+        """The records for that board. `InvalidInput` where the sequence is for another or beyond its limits."""
         check(sequence, info, layout)
         rows: list[list[int]] = []
         steps: list[int] = []
@@ -65,7 +66,7 @@ class Program:
         return crc32(self.records.astype("<u2").tobytes())
 
     @property
-    def played(self) -> int:
+    def total(self) -> int:
         """How many steps will be played; 0 where there is no end."""
         return _count(self.sequence.steps, self.sequence.loops)
 

@@ -2,16 +2,18 @@
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.sequence.model import After, Repeat, Sequence, Settled, Step
+from bubbleskin.sequence.steps import STEPS_MAX, After, Repeat, Settled, Step
+
+T = TypeVar("T")
 
 VERSION = 1
 SCHEMA = Path(__file__).with_name("sequence.schema.json")
@@ -25,15 +27,24 @@ _AFTER = {"after_s"}
 _SETTLED = {"settled_mm", "timeout_s", "then"}
 
 
-def to_json(sequence: Sequence, path: str | Path | None) -> str:
-    """See `Sequence.to_json`."""
-    data: dict[str, Any] = {"bubbleskin_sequence": VERSION, "name": sequence.name, "loops": sequence.loops}
-    if sequence.board:
-        data["board"] = sequence.board
-    if sequence.layout:
-        layout = sequence.layout
+class Written(NamedTuple):
+    """What a file holds of a sequence: what `bubbleskin.Sequence`, which imports this module, is made from."""
+
+    steps: Sequence[Step | Repeat]
+    loops: int = 1
+    name: str = ""
+    board: str | None = None
+    layout: Layout | None = None
+
+
+def to_json(written: Written, path: str | Path | None) -> str:
+    """See `bubbleskin.Sequence.to_json`."""
+    data: dict[str, Any] = {"bubbleskin_sequence": VERSION, "name": written.name, "loops": written.loops}
+    if written.board:
+        data["board"] = written.board
+    if layout := written.layout:
         data["layout"] = {"pitch_mm": layout.pitch_mm, "positions_mm": layout.positions_mm.tolist()}
-    lines = ",\n    ".join(json.dumps(_part(part), ensure_ascii=False) for part in sequence.steps)
+    lines = ",\n    ".join(json.dumps(_part(part), ensure_ascii=False) for part in written.steps)
     head = json.dumps(data, ensure_ascii=False)[1:-1]
     text = f'{{\n  {head},\n  "steps": [\n    {lines}\n  ]\n}}\n'  # a line for each step
     if path is not None:
@@ -57,8 +68,8 @@ def _part(part: Step | Repeat) -> dict[str, Any]:
     return {**named, "targets_mm": targets, "ramp_s": part.ramp, "easing": part.easing, "until": until}
 
 
-def from_json(source: str | Path) -> Sequence:
-    """See `Sequence.from_json`."""
+def from_json(source: str | Path, make: Callable[[Written], T]) -> T:
+    """See `bubbleskin.Sequence.from_json`; what `make` refuses is refused with the file's name."""
     where = "The text"
     text = str(source)
     if isinstance(source, Path) or not text.lstrip().startswith("{"):
@@ -68,7 +79,7 @@ def from_json(source: str | Path) -> Sequence:
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"{where} is not JSON: {error}.") from None
     try:
-        return _sequence(data)
+        return make(_written(data))
     except InvalidInput as error:
         raise InvalidInput(f"{where} is not a sequence that can be played. {error}") from None
 
@@ -82,30 +93,31 @@ def _read(path: str | Path) -> str:
         raise InvalidInput(f"{path} is not a text in UTF-8, so it is no sequence.") from None
 
 
-def _sequence(data: Any) -> Sequence:
+def _written(data: Any) -> Written:
     _known(data, _SEQUENCE, "The sequence")
     version = data.get("bubbleskin_sequence")
     if version != VERSION or isinstance(version, bool):
         raise InvalidInput(f"bubbleskin_sequence, the version of the format, is {version!r}; this SDK reads {VERSION}.")
-    layout = None
-    if data.get("layout") is not None:
-        _known(data["layout"], _LAYOUT, "layout")
-        try:
-            layout = Layout(
-                np.array(data["layout"].get("positions_mm"), dtype=float), float(data["layout"]["pitch_mm"])
-            )
-        except (TypeError, ValueError, KeyError) as error:
-            raise InvalidInput(f"layout is not one of pitch_mm and positions_mm: {error}.") from None
     for key in ("name", "board"):
         if not isinstance(data.get(key, ""), str):
             raise InvalidInput(f"{key} is {data[key]!r}; it must be a text.")
-    return Sequence(
+    return Written(
         _list(data.get("steps"), "steps", 0),
         loops=data.get("loops", 1),
         name=data.get("name", ""),
         board=data.get("board"),
-        layout=layout,
+        layout=_layout(data.get("layout")),
     )
+
+
+def _layout(data: Any) -> Layout | None:
+    if data is None:
+        return None
+    _known(data, _LAYOUT, "layout")
+    try:
+        return Layout(np.array(data.get("positions_mm"), dtype=float), float(data["pitch_mm"]))
+    except (TypeError, ValueError, KeyError) as error:
+        raise InvalidInput(f"layout is not one of pitch_mm and positions_mm: {error}.") from None
 
 
 def _list(data: Any, where: str, depth: int) -> list[Step | Repeat]:
@@ -113,7 +125,7 @@ def _list(data: Any, where: str, depth: int) -> list[Step | Repeat]:
         raise InvalidInput(f"{where} is {data!r:.40}; it must be a list of steps and repeats.")
     if depth > _NESTED:
         raise InvalidInput(f"{where} is nested {depth} deep.")
-    if len(data) > 65535:
+    if len(data) > STEPS_MAX:
         return [Step(None, until=After(1))] * len(data)  # too many for a sequence, which says so
     return [_read_part(part, f"{where}[{index}]", depth) for index, part in enumerate(data)]
 
@@ -122,19 +134,19 @@ def _read_part(data: Any, where: str, depth: int) -> Step | Repeat:
     if isinstance(data, dict) and "repeat" in data:
         _known(data, _REPEAT, where)
         inner = _list(data.get("steps"), f"{where}.steps", depth + 1)
-        return _told(where, lambda: Repeat(inner, data["repeat"]))
+        return _located(where, lambda: Repeat(inner, data["repeat"]))
     _known(data, _STEP, where)
     if "targets_mm" not in data:
         raise InvalidInput(f"{where} has no targets_mm; give a height for each bubble, or null to leave them.")
     until = data.get("until", {"after_s": 0.0})
     if isinstance(until, dict) and "after_s" in until:
         _known(until, _AFTER, f"{where}.until")
-        condition: Callable[[], After | Settled] = lambda: After(until["after_s"])  # noqa: E731
+        condition: Callable[[], After | Settled] = partial(After, until["after_s"])
     else:
         _known(until, _SETTLED, f"{where}.until")
         names = {"settled_mm": "tolerance_mm", "timeout_s": "timeout_s", "then": "then"}
-        condition = lambda: Settled(**{names[key]: value for key, value in until.items()})  # noqa: E731
-    return _told(
+        condition = partial(Settled, **{names[key]: value for key, value in until.items()})
+    return _located(
         where,
         lambda: Step(
             data["targets_mm"],
@@ -146,7 +158,8 @@ def _read_part(data: Any, where: str, depth: int) -> Step | Repeat:
     )
 
 
-def _told(where: str, make: Callable[[], Any]) -> Any:
+def _located(where: str, make: Callable[[], T]) -> T:
+    """What `make` makes; its refusal says where in the file the mistake stands."""
     try:
         return make()
     except InvalidInput as error:
@@ -163,8 +176,8 @@ def _known(data: Any, keys: set[str], where: str) -> None:
         )
 
 
-def from_csv(path: str | Path, easing: str, lead: float, how: dict[str, Any]) -> Sequence:
-    """See `Sequence.from_csv`."""
+def steps_from_csv(path: str | Path, easing: str, lead: float) -> list[Step | Repeat]:
+    """See `bubbleskin.Sequence.from_csv`."""
     lines = csv.reader(_read(path).splitlines())
     head = [name.strip() for name in next(lines, [])]
     expected = ["time_s", *(f"b{bubble}" for bubble in range(len(head) - 1))]
@@ -190,10 +203,10 @@ def from_csv(path: str | Path, easing: str, lead: float, how: dict[str, Any]) ->
             )
         ramp = (now - before) / 1000 if now else lead
         before = now
-        steps.append(_told(where, partial(Step, heights, ramp, easing)))
+        steps.append(_located(where, partial(Step, heights, ramp, easing)))
     if not steps:
         raise InvalidInput(f"{path} has no rows below its header; a timeline needs at least one.")
-    return Sequence(steps, **how)
+    return steps
 
 
 def _cell(text: str, where: str) -> float | None:

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.sequence.model import After, Sequence, Settled, Step
+from bubbleskin.sequence.model import Sequence
+from bubbleskin.sequence.steps import After, Settled, Step
 
 LOW_MM, HIGH_MM = 5.5, 12.0
 _FRAMES = 16  # of one period of a wave

@@ -1,4 +1,4 @@
-"""Ready-made shapes, and shapes from files and words."""
+"""Ready-made shapes, and heights from files and from the command line's arguments."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,6 +10,7 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 
 LOW_MM, HIGH_MM = 5.5, 12.0
+"""Lowest and highest of the ready-made shapes."""
 
 
 def dome(layout: Layout) -> NDArray[np.float64]:
@@ -33,18 +34,22 @@ def flat(layout: Layout) -> NDArray[np.float64]:
 SHAPES: dict[str, Callable[[Layout], NDArray[np.float64]]] = {"dome": dome, "plane": plane, "flat": flat}
 
 
-def numbers(words: Sequence[str]) -> NDArray[np.float64]:
-    """Heights in mm from words."""
-    for word in words:
+def parse_heights(texts: Sequence[str]) -> NDArray[np.float64]:
+    """Heights in mm, (n,), from one text each. Raises `InvalidInput` for one that is not a number."""
+    heights = []
+    for text in texts:
         try:
-            float(word)
+            heights.append(float(text))
         except ValueError:
-            raise InvalidInput(f"{word!r} is not a height in mm; give numbers, one per bubble.") from None
-    return np.array([float(word) for word in words])
+            raise InvalidInput(f"{text!r} is not a height in mm; give numbers, one per bubble.") from None
+    return np.array(heights)
 
 
 def load(path: Path) -> NDArray[np.float64]:
-    """A heightfield in mm from a .npy file, or from a text file of numbers with commas between them."""
+    """A heightfield in mm from a .npy file, or from a text file of numbers with commas between them.
+
+    Raises `InvalidInput` for a file that cannot be read or holds something else.
+    """
     try:
         field = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.loadtxt(path, delimiter=",")
         return np.asarray(field, dtype=float)

@@ -6,7 +6,8 @@ import numpy as np
 
 from bubble_protocol import codec, frame
 from bubble_protocol.schema import telemetry
-from bubbleskin.device.records import State, board_fault_names, fault_names, mode_name, status_name
+from bubbleskin.device.faults import board_fault_names, fault_names
+from bubbleskin.device.state import State, mode_name, status_name
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.message import Message
 

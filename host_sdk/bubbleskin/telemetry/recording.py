@@ -9,7 +9,8 @@ from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any, Self
 
-from bubbleskin.device.records import Info, State
+from bubbleskin.device.info import Info
+from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import run_sync
@@ -95,6 +96,9 @@ class Recording:
         self._end: Callable[[], Coroutine[Any, Any, None]] | None = end
         self._broken: OSError | None = None
         self.lost = 0
+
+    def __repr__(self) -> str:
+        return f"<Recording {self.path}: {self.rows} rows, {self.lost} lost>"
 
     @property
     def path(self) -> Path:

@@ -6,7 +6,8 @@ import os
 from collections.abc import AsyncGenerator, Iterable
 
 from bubble_protocol.schema import messages
-from bubbleskin.device.records import Info, State
+from bubbleskin.device.info import Info
+from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import Link

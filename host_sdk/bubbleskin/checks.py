@@ -1,13 +1,17 @@
-"""What every public function of the physics asks of its input, and how it says no."""
+"""What every public function of the physics asks of its numbers, and how it says no."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bubbleskin.errors import InvalidInput
+
+Numbers = TypeVar("Numbers", float, NDArray[np.float64])
+"""One number or an array of them: what goes in as one comes out as one."""
 
 
 def finite(name: str, value: Any) -> np.ndarray:
@@ -45,6 +49,7 @@ def one_of(name: str, value: Any, allowed: Sequence[str]) -> None:
         raise InvalidInput(f"{name} is {value!r}, but must be one of {', '.join(map(repr, allowed))}.")
 
 
-def like(given: Any, result: Any) -> Any:
+def like(given: Numbers, result: Any) -> Numbers:
     """``result`` as a float if ``given`` was a scalar, else as the array that it is."""
-    return float(result) if np.ndim(given) == 0 else result
+    same: Any = float(result) if np.ndim(given) == 0 else result
+    return same

@@ -1,18 +1,13 @@
-"""The fault log and the settings of a wristband, as plain values."""
+"""What can be set on a wristband: the replies to SETTING_READ, and what SETTING_WRITE takes."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from bubble_protocol.schema import faults, system
 from bubble_protocol.schema.settings import SETTINGS
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.message import Message
 
-_OF_BUBBLE = {bit: name for bit, name, _ in faults.FAULTS}
-_OF_BOARD = {bit: name for bit, name, _ in (*faults.BOARD_FAULTS, *faults.EVENTS)}
-_EVENTS = {bit for bit, _, _ in faults.EVENTS}
 _NUMBERS = {name: number for number, name, *_ in SETTINGS}
 
 NAMES = {
@@ -24,22 +19,6 @@ NAMES = {
 
 
 @dataclass(frozen=True)
-class Fault:
-    """One entry of the fault log."""
-
-    id: int
-    """Counts from 1 since the wristband's start."""
-    time: float
-    """Device time, s since boot."""
-    name: str
-    bubble: int | None
-    """None: the board as a whole."""
-    value: float
-    """What was measured: the bubble's pressure or the reservoir's, kPa; of host_silent the silence, s."""
-    acknowledged: bool
-
-
-@dataclass(frozen=True)
 class Setting:
     """One setting in use, and what this wristband allows."""
 
@@ -48,26 +27,7 @@ class Setting:
     high: float
 
 
-def entries(reply: Message, tick: float) -> list[Fault]:
-    """The entries in a reply to FAULTS_READ."""
-    now, columns = reply["ticks"], reply.columns
-    found = []
-    for number, at, what, bubble, value in zip(*(columns[name].tolist() for name in columns), strict=True):
-        board = bubble == faults.BOARD
-        found.append(
-            Fault(
-                id=number,
-                time=(now - (now - at) % system.TICKS_WRAP) * tick,
-                name=(_OF_BOARD if board else _OF_BUBBLE).get(what, "unknown"),
-                bubble=None if board else bubble,
-                value=value / 1000,
-                acknowledged=number <= reply["acknowledged"],
-            )
-        )
-    return found
-
-
-def settings(reply: Message) -> dict[str, Setting]:
+def settings_of(reply: Message) -> dict[str, Setting]:
     """The settings in a reply to SETTING_READ, by their names here."""
     columns = reply.columns
     rows = {
@@ -81,7 +41,7 @@ def settings(reply: Message) -> dict[str, Setting]:
     }
 
 
-def changes(wanted: Mapping[str, Any], allowed: Mapping[str, Setting]) -> list[tuple[int, int]]:
+def changes(wanted: Mapping[str, float], allowed: Mapping[str, Setting]) -> list[tuple[int, int]]:
     """The entries of SETTING_WRITE for what is wanted; `InvalidInput` for what is not allowed."""
     rows = []
     values = {name: setting.value for name, setting in allowed.items()}

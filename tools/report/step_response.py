@@ -1,12 +1,12 @@
 """How well the simulated wristbands take shapes: true heights after steps, measured and printed as one table.
 
-    python tools/report/steps.py
-    python tools/report/steps.py --shows 50 --sheets 10 --json
+    python tools/report/step_response.py
+    python tools/report/step_response.py --shows 50 --sheets 10 --json
 
-Every row is one kind of sheet and one range of heights: the sheet that matches the board's tables, or sheets
+Every case is one kind of sheet and one range of heights: the sheet that matches the board's tables, or sheets
 with part-to-part spread that nobody has calibrated; heights beside the plateau (5.5 to 7 and 9 to 12.5 mm) or
-on it (7 to 9 mm). Shows follow each other without a pause between them, starting at rest; the first rows of
-heights beside the plateau are the extremes. The same arguments give the same figures.
+on it (7 to 9 mm). Shows follow each other without a pause between them, starting at rest; the first shows of
+heights beside the plateau are the extremes. The same arguments give the same values.
 """
 
 import argparse
@@ -24,14 +24,16 @@ from rich.table import Table
 import bubbleskin as bs
 
 LOW, PLATEAU_LOW, PLATEAU_HIGH, HIGH = 5.5, 7.0, 9.0, 12.5
+"""mm."""
 SOON, LATER = 0.6, 2.0
+"""Seconds after the request at which errors are taken."""
 NEAR = 0.2
 """mm within which a bubble counts as arrived."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One row of the report."""
+    """One kind of sheet and one range of heights: a column of the report."""
 
     board: str
     spread: float
@@ -39,12 +41,12 @@ class Case:
 
     @property
     def sheet(self) -> str:
-        """What the bubbles are like, in words."""
+        """What the bubbles are like, for people."""
         return f"spread {self.spread:g}" if self.spread else "nominal"
 
     @property
     def heights(self) -> str:
-        """The range of heights, in words."""
+        """The range of heights in mm, for people."""
         return (
             f"{PLATEAU_LOW:g}-{PLATEAU_HIGH:g}"
             if self.plateau
@@ -53,8 +55,8 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Trim:
-    """What was measured in one row: heights in mm, times in s, over all bubbles of all shows."""
+class Statistics:
+    """What was measured in one case: heights in mm, times in s, over all bubbles of all shows."""
 
     shows: int
     rms_soon: float
@@ -75,11 +77,11 @@ class Trim:
     pulses_max: float
     """Of the busiest bubble in its busiest second."""
     faults: int
-    """Shows in which a bubble was isolated; its errors are in the figures."""
+    """Shows in which a bubble was isolated; its errors are counted with the others."""
 
 
 @dataclass(frozen=True)
-class Step:
+class StepResponse:
     """One show: `height` is (ticks, n) mm from the tick after the request, `pulses` whether one began, (ticks, n)."""
 
     tick: float
@@ -90,7 +92,7 @@ class Step:
     faulty: bool
 
     def at(self, seconds: float) -> int:
-        """The row that stands for so long after the request."""
+        """The index of the tick that ends so long after the request."""
         return min(round(seconds / self.tick), len(self.height)) - 1
 
     def settling(self) -> NDArray[np.float64]:
@@ -113,7 +115,7 @@ class Step:
         return int((sums[second:] - sums[:-second]).max(initial=0))
 
 
-def measure(skin: bs.Skin, target: NDArray[np.float64], seconds: float) -> Step:
+def measure(skin: bs.Skin, target: NDArray[np.float64], seconds: float) -> StepResponse:
     """Show `target` and watch the true heights tick by tick."""
     board = skin.simulated
     assert board is not None
@@ -129,7 +131,7 @@ def measure(skin: bs.Skin, target: NDArray[np.float64], seconds: float) -> Step:
     held = np.zeros(energised.shape, bool)  # a valve still on from the tick before begins no pulse
     held[1:] = energised[:-1] >= tick
     began = np.logical_and(energised > 0, ~held)
-    return Step(tick, start, target, heights, began[..., 0] | began[..., 1], bool(skin.faults()))
+    return StepResponse(tick, start, target, heights, began[..., 0] | began[..., 1], bool(skin.faults()))
 
 
 def targets(rng: np.random.Generator, n: int, plateau: bool, shows: int) -> Iterator[NDArray[np.float64]]:
@@ -149,29 +151,29 @@ def targets(rng: np.random.Generator, n: int, plateau: bool, shows: int) -> Iter
             yield np.where(drawn < PLATEAU_LOW, drawn, drawn + PLATEAU_HIGH - PLATEAU_LOW)
 
 
-def figures(steps: list[Step]) -> Trim:
-    """Put the shows of one row together."""
+def statistics(responses: list[StepResponse]) -> Statistics:
+    """Put the shows of one case together."""
 
     def error_at(seconds: float) -> NDArray[np.float64]:
-        return np.concatenate([step.height[step.at(seconds)] - step.target for step in steps])
+        return np.concatenate([one.height[one.at(seconds)] - one.target for one in responses])
 
     soon, later = error_at(SOON), error_at(LATER)
-    settling = np.concatenate([step.settling() for step in steps])
-    rest = [step.pulses[step.at(SOON) + 1 :] for step in steps]
-    return Trim(
-        shows=len(steps),
+    settling = np.concatenate([one.settling() for one in responses])
+    rest = [one.pulses[one.at(SOON) + 1 :] for one in responses]
+    return Statistics(
+        shows=len(responses),
         rms_soon=_rms(soon),
         max_soon=float(np.abs(soon).max()),
         rms_later=_rms(later),
         max_later=float(np.abs(later).max()),
-        max_after=max(float(np.abs(step.height[step.at(SOON) :] - step.target).max()) for step in steps),
-        overshoot=max(float(step.overshoot().max()) for step in steps),
+        max_after=max(float(np.abs(one.height[one.at(SOON) :] - one.target).max()) for one in responses),
+        overshoot=max(float(one.overshoot().max()) for one in responses),
         settling_median=float(np.median(settling)),
         settling_max=float(settling.max()),
         unsettled=float(np.isinf(settling).mean()),
-        pulses_mean=float(np.mean([pulses.mean() for pulses in rest])) / steps[0].tick,
-        pulses_max=float(max(step.busiest_second() for step in steps)),
-        faults=sum(step.faulty for step in steps),
+        pulses_mean=float(np.mean([pulses.mean() for pulses in rest])) / responses[0].tick,
+        pulses_max=float(max(one.busiest_second() for one in responses)),
+        faults=sum(one.faulty for one in responses),
     )
 
 
@@ -179,10 +181,10 @@ def _rms(error: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def print_tables(rows: list[tuple[Case, Trim]], console: Console) -> None:
+def print_tables(found_by_case: list[tuple[Case, Statistics]], console: Console) -> None:
     """One table per board, for people: a column per case, narrow enough for a terminal."""
-    for board in dict.fromkeys(case.board for case, _ in rows):
-        of_board = [(case, found) for case, found in rows if case.board == board]
+    for board in dict.fromkeys(case.board for case, _ in found_by_case):
+        of_board = [(case, found) for case, found in found_by_case if case.board == board]
         table = Table(title=f"{board}: true heights after a step", title_justify="left")
         table.add_column("mm, where no unit is given")
         for case, _ in of_board:
@@ -196,7 +198,7 @@ def print_tables(rows: list[tuple[Case, Trim]], console: Console) -> None:
     )
 
 
-LINES: tuple[tuple[str, Callable[[Trim], str]], ...] = (
+LINES: tuple[tuple[str, Callable[[Statistics], str]], ...] = (
     ("shows", lambda found: str(found.shows)),
     (f"RMS error at {SOON:g} s", lambda found: f"{found.rms_soon:.3f}"),
     (f"largest error at {SOON:g} s", lambda found: f"{found.max_soon:.3f}"),
@@ -218,13 +220,13 @@ def _seconds(value: float) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run all rows and print them."""
+    """Run all cases and print what was found."""
     parser = argparse.ArgumentParser(description="Measure how simulated wristbands follow steps in height.")
     parser.add_argument(
         "--board", action="append", help="wristband7 or wristband19; repeat for several (default: both)"
     )
     parser.add_argument("--firmware", choices=("sim", "micropython"), default="sim", help="what runs it (default: sim)")
-    parser.add_argument("--shows", type=int, default=20, help="per row, over all its sheets (default: 20)")
+    parser.add_argument("--shows", type=int, default=20, help="per case, over all its sheets (default: 20)")
     parser.add_argument("--sheets", type=int, default=5, help="different sheets with spread (default: 5)")
     parser.add_argument("--spread", type=float, default=0.1, help="of the sheets that have some (default: 0.1)")
     parser.add_argument("--seconds", type=float, default=10.6, help="length of a show (default: 10.6)")
@@ -242,44 +244,56 @@ def main(arguments: list[str] | None = None) -> int:
         for plateau in (False, True)
     ]
     console = Console(stderr=options.json)
-    rows: list[tuple[Case, Trim]] = []
+    try:
+        found = run(cases, options)
+    except bs.BubbleskinError as error:
+        Console(stderr=True).print(f"[red]{error}[/red]", highlight=False)
+        return 2 if isinstance(error, bs.InvalidInput) else 1
+    if options.json:
+        sys.stdout.write(json.dumps([asdict(case) | _without_inf(asdict(one)) for case, one in found], indent=2) + "\n")
+    else:
+        print_tables(found, console)
+    return 0
+
+
+def run(cases: list[Case], options: argparse.Namespace) -> list[tuple[Case, Statistics]]:
+    """What was found in each case."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.completed:.0f}/{task.total:.0f} shows"),
         TimeRemainingColumn(),
     )
-    try:
-        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-            bar = progress.add_task("stepping", total=len(cases) * options.shows)
-            for case in cases:
-                progress.update(bar, description=f"{case.board}, spread {case.spread:g}, {case.heights} mm")
-                rng = np.random.default_rng(options.seed)
-                sheets = min(options.sheets, options.shows) if case.spread else 1
-                steps: list[Step] = []
-                for sheet in range(sheets):
-                    url = (
-                        f"{options.firmware}://{case.board}?seed={options.seed + sheet}&spread={case.spread}&contact=0"
-                    )
-                    shows = options.shows // sheets + (sheet < options.shows % sheets)
-                    with bs.connect(url) as skin:
-                        for target in targets(rng, len(skin.layout), case.plateau, shows):
-                            steps.append(measure(skin, target, options.seconds))
-                            progress.advance(bar)
-                            if steps[-1].faulty:
-                                skin.clear_faults()
-                rows.append((case, figures(steps)))
-    except bs.BubbleskinError as error:
-        Console(stderr=True).print(f"[red]{error}[/red]", highlight=False)
-        return 2 if isinstance(error, bs.InvalidInput) else 1
-    if options.json:
-        found = [{name: None if value == np.inf else value for name, value in asdict(f).items()} for _, f in rows]
-        sys.stdout.write(
-            json.dumps([asdict(case) | f for (case, _), f in zip(rows, found, strict=True)], indent=2) + "\n"
-        )
-    else:
-        print_tables(rows, console)
-    return 0
+    found = []
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("stepping", total=len(cases) * options.shows)
+        for case in cases:
+            progress.update(bar, description=f"{case.board}, spread {case.spread:g}, {case.heights} mm")
+            responses = []
+            for response in respond(case, options):
+                responses.append(response)
+                progress.advance(bar)
+            found.append((case, statistics(responses)))
+    return found
+
+
+def respond(case: Case, options: argparse.Namespace) -> Iterator[StepResponse]:
+    """The shows of one case, on all its sheets."""
+    rng = np.random.default_rng(options.seed)
+    sheets = min(options.sheets, options.shows) if case.spread else 1
+    for sheet in range(sheets):
+        url = f"{options.firmware}://{case.board}?seed={options.seed + sheet}&spread={case.spread}&contact=0"
+        shows = options.shows // sheets + (sheet < options.shows % sheets)
+        with bs.connect(url) as skin:
+            for target in targets(rng, len(skin.layout), case.plateau, shows):
+                response = measure(skin, target, options.seconds)
+                yield response
+                if response.faulty:
+                    skin.clear_faults()
+
+
+def _without_inf(values: dict[str, float]) -> dict[str, float | None]:
+    return {name: None if value == np.inf else value for name, value in values.items()}
 
 
 if __name__ == "__main__":

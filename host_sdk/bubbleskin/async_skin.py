@@ -1,0 +1,309 @@
+"""One wristband, real or simulated, for asyncio. It does the work; `Skin` runs it without an event loop."""
+
+import os
+from collections.abc import AsyncGenerator, Iterable, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Literal, Self, overload
+
+import numpy as np
+
+from bubble_protocol.schema import sequences, system
+from bubbleskin.device import tables as device_tables
+from bubbleskin.device.faults import Fault, read_log
+from bubbleskin.device.health import Health, TickHistogram
+from bubbleskin.device.info import Info
+from bubbleskin.device.settings import Setting, changes, settings_of
+from bubbleskin.device.state import State
+from bubbleskin.device.store import StoreInfo
+from bubbleskin.device.trim import Trim
+from bubbleskin.errors import DeviceFault, InvalidInput
+from bubbleskin.fault_guide import remedies
+from bubbleskin.layout import Layout
+from bubbleskin.link.clock import Clock
+from bubbleskin.link.link import Link
+from bubbleskin.link.message import Message
+from bubbleskin.link.synchronise import PINGS, ping
+from bubbleskin.link.transport import Transport
+from bubbleskin.sequence.model import Playable
+from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
+from bubbleskin.sequence.player import Player
+from bubbleskin.shape.heightfield import Heights, sample
+from bubbleskin.telemetry.recording import Recording
+from bubbleskin.telemetry.stream import Telemetry
+
+if TYPE_CHECKING:
+    from bubbleskin.membrane.calibration import Calibration
+    from bubbleskin.membrane.table import Table
+    from bubbleskin.sim.board import Simulated
+
+SETTLE = 3.0
+"""Seconds beyond `over` after which `show` gives up waiting; the valves need about half of one."""
+
+UNASKED_END = "it was stopped or vented, or its host was silent for too long; see `fault_log()`."
+"""Why a wristband without a fault does no longer what it was asked to."""
+
+OVER_MAX = 60.0
+"""Seconds that a change of shape may take at most."""
+
+_POLL = 0.02
+"""Seconds between two looks at whether a shape has settled."""
+
+
+class AsyncSkin:
+    """A wristband, for asyncio; made by `bubbleskin.aconnect`. Methods and attributes as of `Skin`."""
+
+    def __init__(self, link: Link, info: Info, layout: Layout, simulated: "Simulated | None" = None):
+        self.link = link
+        """Requests and replies, for those who measure or test them; a script has no need of it."""
+        self.info = info
+        self.layout = layout
+        self.simulated = simulated
+        link.on_open = self._opened
+        self._player = Player(link, info, layout)
+        self._telemetry = Telemetry(link, info)
+        self.clock = Clock(info.tick, link.transport.now)
+        """The device's time, from the pings so far; `synchronise` sends some."""
+        link.on_ping = self.clock.hear
+
+    @classmethod
+    async def open(
+        cls,
+        transport: Transport,
+        timeout: float,
+        *,
+        event_loop: bool = False,
+        simulated: "Simulated | None" = None,
+    ) -> Self:
+        """Greet the device at the other end of `transport`."""
+        link = Link(transport, timeout, event_loop=event_loop)
+        try:
+            info = Info.of(await link.hello())
+            return cls(link, info, Layout.of_board(info.board, info.bubbles), simulated)
+        except BaseException:
+            await link.close()
+            raise
+
+    def _opened(self, reply: Message) -> None:
+        """A new session: the device may have restarted, with other tables or firmware."""
+        self.info = Info.of(reply)
+        self._telemetry.opened()
+
+    @overload
+    async def show(self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True) -> State: ...
+    @overload
+    async def show(self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False]) -> None: ...
+    @overload
+    async def show(self, heights_mm: Heights, over: float, wait: Literal[False]) -> None: ...
+    @overload
+    async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None: ...
+    async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
+        """See `Skin.show`."""
+        heights = sample(heights_mm, self.layout, self.info.height_max_mm)
+        if not 0.0 <= over <= OVER_MAX:
+            raise InvalidInput(f"over is {over} s; a change may take 0 to {OVER_MAX:g} s.")
+        micrometres = np.rint(heights * 1000).astype(int).tolist()
+        await self.link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
+        return await self._settle(over + SETTLE) if wait else None
+
+    async def _settle(self, patience: float) -> State:
+        """The state in which every bubble has settled; `DeviceFault` if that does not come within `patience` seconds."""
+        deadline = self.link.transport.now() + patience
+        while True:
+            state = await self.state()
+            await self._check(state)
+            if state.settled:
+                return state
+            if self.link.transport.now() >= deadline:
+                raise self._unsettled(state, patience)
+            await self.sleep(_POLL)
+
+    async def _check(self, state: State) -> None:
+        """`DeviceFault` where a bubble has a fault, or the board no longer controls heights."""
+        ill = {bubble: found for bubble, found in enumerate(state.faults) if found}
+        if ill:
+            what = "; ".join(f"bubble {bubble}: {', '.join(found)}" for bubble, found in ill.items())
+            advice = remedies(name for found in ill.values() for name in found)
+            raise DeviceFault(f"The wristband reports faults ({what}). {advice} Then `clear_faults()`.")
+        if state.mode != "active":
+            board = (await self.health()).board_faults
+            why = f"faults of the board: {', '.join(board)}. {remedies(board)}" if board else UNASKED_END
+            raise DeviceFault(f"The wristband is {state.mode} in the middle of a show: {why}")
+
+    def _unsettled(self, state: State, patience: float) -> DeviceFault:
+        late = state.unsettled
+        where = ", ".join(f"{state.height_mm[b]:.2f} instead of {state.target_mm[b]:.2f} mm" for b in late)
+        return DeviceFault(
+            f"{self.layout.names(late).capitalize()} did not settle within {patience:g} s: at {where}. "
+            "Check the supply pressure in `health()`, leaks and kinked tubes."
+        )
+
+    async def state(self) -> State:
+        """See `Skin.state`."""
+        return State.of(await self.link.call("STATE"), self.info.tick)
+
+    async def health(self) -> Health:
+        """See `Skin.health`."""
+        return Health.of(await self.link.call("INFO"), self.info.tick)
+
+    async def tick_histogram(self) -> TickHistogram:
+        """See `Skin.tick_histogram`."""
+        return TickHistogram.of(await self.link.call("TICKS"))
+
+    async def restart(self, into: str = "firmware") -> None:
+        """See `Skin.restart`."""
+        numbers = {name: number for number, name, _ in system.RESTARTS}
+        if into not in numbers:
+            raise InvalidInput(f"A wristband cannot restart into {into!r}; choose one of {', '.join(numbers)}.")
+        await self.link.call("RESTART", (numbers[into],))
+        self.link.restart_asked = True
+        self.link.open = False  # the next call opens a session with the new boot
+
+    def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> AsyncGenerator[State]:
+        """See `Skin.telemetry`."""
+        return self._telemetry.states(rate_hz, fields)
+
+    async def record(
+        self,
+        path: str | os.PathLike[str],
+        rate_hz: float = 20,
+        seconds: float | None = None,
+        fields: Iterable[str] | None = None,
+    ) -> Recording:
+        """See `Skin.record`."""
+        return await self._telemetry.record(path, self.layout, rate_hz, seconds, fields)
+
+    async def synchronise(self, pings: int = PINGS) -> Clock:
+        """Send pings at once, for the clock to begin with; returns it."""
+        await ping(self.link, self.clock, pings)
+        return self.clock
+
+    @overload
+    async def play(
+        self, sequence: Playable, at: float | None = None, wait: Literal[True] = True, progress: Progress | None = None
+    ) -> PlaybackReport: ...
+    @overload
+    async def play(
+        self, sequence: Playable, at: float | None = None, *, wait: Literal[False], progress: Progress | None = None
+    ) -> None: ...
+    @overload
+    async def play(
+        self, sequence: Playable, at: float | None, wait: Literal[False], progress: Progress | None = None
+    ) -> None: ...
+    @overload
+    async def play(
+        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress | None = None
+    ) -> PlaybackReport | None: ...
+    async def play(
+        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress | None = None
+    ) -> PlaybackReport | None:
+        """See `Skin.play`."""
+        started = await self._player.start(sequence, at, follow=wait)
+        return await self._player.follow(started, progress) if wait else None
+
+    async def playing(self) -> PlaybackStatus:
+        """See `Skin.playing`."""
+        return await self._player.status()
+
+    async def pause(self) -> None:
+        """See `Skin.pause`."""
+        await self._player.control(sequences.PAUSE)
+
+    async def resume(self) -> None:
+        """See `Skin.resume`."""
+        await self._player.control(sequences.RESUME)
+
+    async def stop(self) -> None:
+        """See `Skin.stop`."""
+        await self.link.call("STOP")
+
+    async def vent(self) -> None:
+        """See `Skin.vent`."""
+        await self.link.call("VENT")
+
+    async def faults(self) -> dict[int, tuple[str, ...]]:
+        """See `Skin.faults`."""
+        state = await self.state()
+        return {bubble: faults for bubble, faults in enumerate(state.faults) if faults}
+
+    async def clear_faults(self) -> None:
+        """See `Skin.clear_faults`."""
+        await self.link.call("CLEAR")
+
+    async def fault_log(self) -> list[Fault]:
+        """See `Skin.fault_log`."""
+        return await read_log(self.link, self.info.tick)
+
+    async def acknowledge(self, fault: Fault | int) -> None:
+        """See `Skin.acknowledge`."""
+        await self.link.call("FAULTS_ACK", (fault.id if isinstance(fault, Fault) else fault,))
+
+    async def settings(self) -> dict[str, Setting]:
+        """See `Skin.settings`."""
+        return settings_of(await self.link.call("SETTING_READ"))
+
+    async def configure(self, **wanted: float) -> None:
+        """See `Skin.configure`."""
+        rows = changes(wanted, await self.settings())
+        if rows:
+            await self.link.call("SETTING_WRITE", (), rows)
+
+    async def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
+        """See `Skin.upload_tables`."""
+        await device_tables.upload(self.link, device_tables.one_per_bubble(tables, self.info))
+        if save:
+            await self.save()
+
+    async def trim(self) -> Trim:
+        """See `Skin.trim`."""
+        return Trim.of(await self.link.call("TRIM_READ"))
+
+    async def upload_trim(self, trim: Trim, save: bool = False) -> None:
+        """See `Skin.upload_trim`."""
+        await self.link.call("TRIM_WRITE", (), trim.rows(self.info.bubbles))
+        if save:
+            await self.save()
+
+    async def save(self) -> StoreInfo:
+        """See `Skin.save`."""
+        return StoreInfo.of(await self.link.call("STORE_SAVE"))
+
+    async def stored(self) -> StoreInfo:
+        """See `Skin.stored`."""
+        return StoreInfo.of(await self.link.call("STORE_INFO"))
+
+    async def factory_reset(self) -> StoreInfo:
+        """See `Skin.factory_reset`."""
+        return StoreInfo.of(await self.link.call("STORE_RESET"))
+
+    async def read_tables(self) -> "list[Table]":
+        """See `Skin.read_tables`."""
+        return await device_tables.read(self.link, self.info.bubbles)
+
+    async def sleep(self, seconds: float) -> None:
+        """See `Skin.sleep`."""
+        await self.link.wait(self.link.transport.now() + seconds)
+
+    async def aclose(self) -> None:
+        """Let go of the device. Without a host it holds what moves after 250 ms and vents after 1 s, see `settings`."""
+        try:
+            await self._telemetry.aclose()
+        finally:
+            await self.link.close()
+
+    def __repr__(self) -> str:
+        return describe("AsyncSkin", self.link, self.info)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.aclose()
+
+
+def describe(kind: str, link: Link, info: Info) -> str:
+    """A skin in a line: where it is, how many bubbles it has, whether it is open."""
+    board = "" if info.board in link.transport.name else f" {info.board},"
+    closed = ", closed" if link.closed else ""
+    return f"<{kind} {link.transport.name}:{board} {info.bubbles} bubbles{closed}>"

@@ -1,0 +1,56 @@
+"""What sets each bubble apart besides its table: the reply to TRIM_READ, and what TRIM_WRITE takes."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.errors import InvalidInput
+from bubbleskin.link.message import Message
+
+
+@dataclass(frozen=True, eq=False)
+class Trim:
+    """What sets each bubble apart besides its table, (n,) each, whole numbers as the firmware has them."""
+
+    zero: NDArray[np.int64]
+    """Sensor counts without pressure."""
+    opens_us: NDArray[np.int64]
+    """From current to an open valve, µs."""
+    closes_us: NDArray[np.int64]
+    """From no current to a closed valve, µs."""
+    flow_gain: NDArray[np.int64]
+    """Flow of the restrictor: root of pressures (8 Pa) to µJ/ms, /65536."""
+
+    def __repr__(self) -> str:
+        return (
+            f"<Trim of {len(self.zero)} bubbles: zero {_range(self.zero)} counts, opens in {_range(self.opens_us)} µs, "
+            f"closes in {_range(self.closes_us)} µs, flow {_range(self.flow_gain)}>"
+        )
+
+    @classmethod
+    def of(cls, reply: Message) -> Self:
+        """From the reply to TRIM_READ."""
+        return cls(**reply.columns)
+
+    def rows(self, bubbles: int) -> list[tuple[int, ...]]:
+        """One row per bubble, as the wire wants them; `InvalidInput` where that cannot be."""
+        rows = []
+        for name in ("zero", "opens_us", "closes_us", "flow_gain"):
+            values = np.asarray(getattr(self, name))
+            if values.shape != (bubbles,):
+                raise InvalidInput(
+                    f"{name} has the shape {values.shape}; give one number for each of {bubbles} bubbles."
+                )
+            if not (np.isfinite(values).all() and (values == np.rint(values)).all()):
+                raise InvalidInput(f"{name} must be whole numbers; {values.tolist()} are not.")
+            if (values < 0).any() or (values > 65535).any():
+                raise InvalidInput(f"{name} is {values.tolist()}; numbers from 0 to 65535 are allowed.")
+            rows.append(values.astype(int).tolist())
+        return list(zip(*rows, strict=True))
+
+
+def _range(values: NDArray[np.int64]) -> str:
+    low, high = np.min(values), np.max(values)
+    return f"{low}" if low == high else f"{low} to {high}"
