@@ -19,10 +19,9 @@ from bubbleskin.device.trim import Trim
 from bubbleskin.errors import DeviceFault, InvalidInput
 from bubbleskin.fault_guide import remedies
 from bubbleskin.layout import Layout
-from bubbleskin.link.clock import Clock
+from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link
 from bubbleskin.link.message import Message
-from bubbleskin.link.synchronise import PINGS, ping
 from bubbleskin.link.transport import Transport
 from bubbleskin.sequence.model import Playable
 from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
@@ -174,7 +173,7 @@ class AsyncSkin:
 
     async def synchronise(self, pings: int = PINGS) -> Clock:
         """Send pings at once, for the clock to begin with; returns it."""
-        await ping(self.link, self.clock, pings)
+        await self.link.send_pings(pings)
         return self.clock
 
     @overload

@@ -6,7 +6,8 @@ from urllib.parse import parse_qsl, urlsplit
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.link import run_sync
-from bubbleskin.link.transport import SerialTransport, Transport, only_attached
+from bubbleskin.link.serial import SerialTransport, only_attached
+from bubbleskin.link.transport import Transport
 from bubbleskin.skin import Skin
 
 if TYPE_CHECKING:

@@ -14,9 +14,8 @@ from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
 from bubbleskin.device.trim import Trim
 from bubbleskin.layout import Layout
-from bubbleskin.link.clock import Clock
+from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link, run_sync
-from bubbleskin.link.synchronise import PINGS
 from bubbleskin.sequence.model import Playable
 from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
 from bubbleskin.shape.heightfield import Heights

@@ -7,7 +7,8 @@ import pytest
 from bubble_firmware.link import receive_window
 from bubble_protocol import codec
 from bubble_protocol.schema import errors, messages, modes
-from bubbleskin.link.message import Reader, encode, session_key
+from bubbleskin.link.message import encode, session_key
+from bubbleskin.link.reader import Reader
 
 SHOW_REPLY = messages.SHOW | messages.REPLY
 

@@ -12,7 +12,8 @@ from bubble_firmware import boards
 from bubble_firmware.control.nominal import KNOTS
 from bubble_protocol import steps
 from bubble_protocol.schema import faults, messages, sequences
-from bubbleskin.link.message import Reader, encode, session_key
+from bubbleskin.link.message import encode, session_key
+from bubbleskin.link.reader import Reader
 from bubbleskin.sim import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.micropython import MicroPythonFirmware

@@ -46,9 +46,9 @@ def test_files_onto_a_stock_micropython_then_once_more(built, tmp_path):
     assert again.info.boot_id != outcome.info.boot_id
     machine.pull_out()
     machine.plug_in(bootsel=True)
-    outcome = flash(machine, Order(board="wristband7"), kept=tmp_path / "kept")  # a UF2 takes the place of it all
+    outcome = flash(machine, Order(board="wristband7"), history=tmp_path / "history")  # a UF2 takes the place of it all
     assert outcome.how == "uf2"
-    outcome = flash(machine, Order(), kept=tmp_path / "kept")  # through the prompt into the boot loader
+    outcome = flash(machine, Order(), history=tmp_path / "history")  # through the prompt into the boot loader
     assert (outcome.how, outcome.old) == ("uf2", outcome.info.firmware)
     machine.pull_out()
     rom_only = EmulatedMachine("wristband7", uf2.read(built[rp2040.STOCK]).data, tmp_path / "drive")

@@ -7,7 +7,7 @@ import pytest
 
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError
 from bubbleskin.flash import Order, flash
-from bubbleskin.flash.kept import Kept
+from bubbleskin.flash.history import History
 from bubbleskin.flash.machine import among, fat_mounts
 
 PORT = "/dev/ttyBubble"
@@ -20,7 +20,7 @@ def bring(computer, file, tmp_path, images):
     new = file(images.new, "today.uf2")
 
     def bring(report=lambda *_: None, **order):
-        return flash(computer, Order(**order), report, build=lambda board: new, kept=tmp_path / "kept")
+        return flash(computer, Order(**order), report, build=lambda board: new, history=tmp_path / "history")
 
     return bring
 
@@ -212,23 +212,23 @@ def test_contradictions_and_what_nobody_can_know(computer, bring, file):
         bring(mpy=True, board="wristband7")
 
 
-def test_what_is_kept_is_the_newest_that_worked_but_is_not_what_was_tried_last(tmp_path):
-    kept = Kept("wristband7", tmp_path)
-    assert kept.previous() is None
-    kept.tried(b"1")
-    assert kept.previous() is None
-    kept.remember(b"1")
-    assert kept.previous() is None  # there is nothing before it
-    kept.tried(b"2")
-    assert kept.previous().read_bytes() == b"1"
-    kept.remember(b"2")
-    kept.remember(b"2")
-    assert kept.previous().read_bytes() == b"1"
-    kept.tried(b"3")
-    assert kept.previous().read_bytes() == b"2"
-    kept.remember(b"3")
-    assert kept.previous().read_bytes() == b"2"
-    assert Kept("wristband19", tmp_path).previous() is None
+def test_the_history_gives_the_newest_that_worked_but_is_not_what_was_tried_last(tmp_path):
+    history = History("wristband7", tmp_path)
+    assert history.previous() is None
+    history.tried(b"1")
+    assert history.previous() is None
+    history.remember(b"1")
+    assert history.previous() is None  # there is nothing before it
+    history.tried(b"2")
+    assert history.previous().read_bytes() == b"1"
+    history.remember(b"2")
+    history.remember(b"2")
+    assert history.previous().read_bytes() == b"1"
+    history.tried(b"3")
+    assert history.previous().read_bytes() == b"2"
+    history.remember(b"3")
+    assert history.previous().read_bytes() == b"2"
+    assert History("wristband19", tmp_path).previous() is None
 
 
 def test_drives_are_known_by_their_file(tmp_path):

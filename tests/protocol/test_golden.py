@@ -12,7 +12,8 @@ import pytest
 
 from bubble_protocol import codec
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.link.message import SCHEMA_CRC, Reader, _signed, encode
+from bubbleskin.link.message import SCHEMA_CRC, _signed, encode
+from bubbleskin.link.reader import Reader
 
 GOLDEN = json.loads((Path(__file__).parent / "golden.json").read_text(encoding="utf-8"))
 every_vector = pytest.mark.parametrize(

@@ -20,7 +20,8 @@ from bubble_protocol.schema import (
     telemetry,
 )
 from bubble_protocol.schema.messages import I16, I32, MESSAGES, REPLY, TEXT, U8, U16, U32
-from bubbleskin.link.message import Message, describe_refusal
+from bubbleskin.link.message import Message
+from bubbleskin.link.refusals import describe_refusal
 from bubbleskin.sim.board import BOARDS
 
 RANGES = {

@@ -15,7 +15,8 @@ from bubble_protocol import codec
 from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import FRAME_MAX, Decoder, finish_frame
 from bubble_protocol.schema import messages
-from bubbleskin.link.message import Reader, session_key
+from bubbleskin.link.message import session_key
+from bubbleskin.link.reader import Reader
 from bubbleskin.sim.firmware import InProcessFirmware
 
 RECORDED = sorted((Path(__file__).parent / "sessions").glob("*.json"))

@@ -12,7 +12,9 @@ from bubble_protocol.schema import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
-from bubbleskin.link.message import Reader, encode, session_key
+from bubbleskin.link.message import encode, session_key
+from bubbleskin.link.reader import Reader
+from bubbleskin.link.transport import Transport
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
 from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve
 from bubbleskin.skin import Skin
@@ -115,7 +117,7 @@ def rekeyed(data, key):
     return out
 
 
-class Scripted:
+class Scripted(Transport):
     """A transport to a device that is a function: `answer(request)` gives the bytes it sends, without the session's key.
 
     HELLO is answered here, unless `answer` does. `requests` has no PINGs that keep the link alive. Time is virtual.
@@ -170,7 +172,7 @@ def scripted():
     return Scripted
 
 
-class Tap:
+class Tap(Transport):
     """A transport on top of another: keeps what passes, and `change(data)` may change it on its way from the device."""
 
     blocks = False
@@ -195,7 +197,7 @@ class Tap:
 
     def understood(self, data):
         """The messages of the open session in `data`, but for the PINGs that keep the link alive and their replies."""
-        reader = Reader(self.skin.link._window.key)
+        reader = Reader(self.skin.link.window.key)
         return [message for message in reader.feed(bytes(data)) if message.id & 0x7F != messages.PING]
 
     def now(self):

@@ -21,7 +21,7 @@ from bubble_protocol.schema import errors
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.message import encode
-from bubbleskin.link.transport import USB_IDS
+from bubbleskin.link.serial import USB_IDS
 from bubbleskin.sim.serve import PtyEnd
 
 pytestmark = pytest.mark.timeout(30)

@@ -78,12 +78,12 @@ class ExactlyOnce(RuleBasedStateMachine):
             number = len(self.requests)
             heights = [(number // soak.BASE,), (number % soak.BASE,), *[(6000,)] * 5]
             request = Request("SHOW", (0,), heights, self.device.now() + 1.0, 1.0)
-            self.link._window.submit(request)
+            self.link.window.submit(request)
             self.requests.append(request)
 
     @rule(name=st.sampled_from(["STOP", "VENT"]))
     def urgent(self, name):
-        self.link._window.submit(Request(name, (), (), self.device.now() + 1.0, 1.0))
+        self.link.window.submit(Request(name, (), (), self.device.now() + 1.0, 1.0))
 
     @rule()
     def call(self):

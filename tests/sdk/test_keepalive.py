@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
+from bubbleskin.link.transport import Transport
 
 pytestmark = pytest.mark.timeout(30)
 
@@ -16,18 +17,26 @@ GAP = 0.1
 TICK = 0.005
 
 
-class Times:
+class Times(Transport):
     """A transport that notes when something is written."""
 
     def __init__(self, transport):
         self.times = []
         self._transport = transport
         self.name, self.blocks = transport.name, transport.blocks
-        self.read, self.now, self.close = transport.read, transport.now, transport.close
 
     def write(self, data):
         self.times.append(self.now())
         self._transport.write(data)
+
+    def read(self, timeout):
+        return self._transport.read(timeout)
+
+    def now(self):
+        return self._transport.now()
+
+    def close(self):
+        self._transport.close()
 
 
 def heard(served):

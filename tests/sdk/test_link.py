@@ -1,6 +1,8 @@
 """Requests and replies on a line that loses, damages and repeats; and the same run twice gives the same bytes."""
 
+import gc
 import random
+import weakref
 from itertools import islice
 
 import numpy as np
@@ -114,10 +116,23 @@ def test_a_late_reply_answers_no_other_request(scripted):
     link = Link(scripted(answer), 1.0)
     for token in range(30):
         assert run_sync(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
-    link._window._next = 0x10000
+    link.window.next_number = 0x10000
     for token in range(100, 129):
         late.clear()
         assert run_sync(link.call("TABLE_COMMIT", (token,)))["tables_crc"] == token
+
+
+def test_a_link_that_nobody_holds_is_gone_at_once(scripted):
+    """Nothing in it refers back to it: its port is free again without waiting for the garbage collector."""
+    link = Link(scripted(lambda request: b""), 1.0)
+    run_sync(link.hello())
+    gone = weakref.ref(link)
+    gc.disable()
+    try:
+        del link
+        assert gone() is None
+    finally:
+        gc.enable()
 
 
 def test_the_answer_to_another_question_is_no_answer(scripted):

@@ -97,12 +97,12 @@ def soon(*steps):
 def test_pulled_and_put_back_between_two_calls(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
         skin.show(np.full(7, 9.5), wait=False)
-        session = skin.link._session
+        session = skin.link.session
         cable.pull()
         time.sleep(0.3)
         cable.push()
         assert skin.state().target_mm.tolist() == [9.5] * 7
-        assert skin.link._session == session, "the same session goes on"
+        assert skin.link.session == session, "the same session goes on"
 
 
 def patient(skin):

@@ -10,7 +10,8 @@ import bubbleskin as bs
 from bubble_protocol import version
 from bubble_protocol.schema import errors, messages
 from bubbleskin.link.link import run_sync
-from bubbleskin.link.message import Reader, encode
+from bubbleskin.link.message import encode
+from bubbleskin.link.reader import Reader
 
 pytestmark = pytest.mark.timeout(60)
 

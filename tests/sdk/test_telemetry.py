@@ -13,8 +13,8 @@ import pytest
 
 import bubbleskin as bs
 from bubbleskin.errors import InvalidInput
-from bubbleskin.link.inbox import Inbox
 from bubbleskin.link.message import Message
+from bubbleskin.link.telemetry_queue import TelemetryQueue
 from bubbleskin.telemetry.fields import NAMES, mask
 
 
@@ -71,23 +71,23 @@ def test_no_more_fields_than_a_message_has_room_for():
 
 
 def test_gaps_are_counted_and_a_late_message_of_the_subscription_before_is_not():
-    inbox = Inbox()
+    queue = TelemetryQueue()
     heard = []
-    inbox.listeners.append(lambda message, lost: heard.append(lost))
-    inbox.begin()
+    queue.listeners.append(lambda message, lost: heard.append(lost))
+    queue.begin()
     for sequence in (1, 2, 5, 5 + 0xFFF0, 6, 10):
-        inbox.append(Message(7, sequence & 0xFFFF, {}, {}))
+        queue.append(Message(7, sequence & 0xFFFF, {}, {}))
     assert heard == [0, 0, 2, 2, 2, 5]
-    inbox.begin()
-    inbox.append(Message(7, 3, {}, {}))
-    assert inbox.lost == 2
+    queue.begin()
+    queue.append(Message(7, 3, {}, {}))
+    assert queue.lost == 2
 
 
 def test_a_wrapped_sequence_number_is_no_gap():
-    inbox = Inbox()
+    queue = TelemetryQueue()
     for sequence in range(1, 70000):
-        inbox.append(Message(7, sequence & 0xFFFF, {}, {}))
-    assert inbox.lost == 0
+        queue.append(Message(7, sequence & 0xFFFF, {}, {}))
+    assert queue.lost == 0
 
 
 def test_losses_are_told(tapped):

@@ -13,7 +13,9 @@ from bubble_protocol.schema import errors, faults, messages, modes, self_test, s
 from bubbleskin.device.health import Health
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State
-from bubbleskin.link.message import SCHEMA_CRC, Reader, _crc32_into, describe_refusal, encode
+from bubbleskin.link.message import SCHEMA_CRC, crc32_into, encode
+from bubbleskin.link.reader import Reader
+from bubbleskin.link.refusals import describe_refusal
 
 
 def receive(*frames):
@@ -290,6 +292,6 @@ def test_fields_that_newer_firmware_appends_are_passed_over():
     end = message.pack(array("i", [7, 8, 9]), 0, frame, Decoder.PAYLOAD_AT)
     frame[end : end + 5] = b"newer"
     put_header(frame, message.id, 1)
-    sealed = bytes(frame[: finish_frame(frame, end + 5 - 1, _crc32_into)])
+    sealed = bytes(frame[: finish_frame(frame, end + 5 - 1, crc32_into)])
     (received,) = Reader().feed(sealed)
     assert received.fields == {"token": 7, "ticks": 8, "phase_us": 9}

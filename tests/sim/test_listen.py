@@ -5,7 +5,8 @@ import pytest
 from bubble_protocol import frame
 from bubble_protocol.schema import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.link.message import Reader, encode, session_key
+from bubbleskin.link.message import encode, session_key
+from bubbleskin.link.reader import Reader
 from bubbleskin.sim.board import SimulatedBoard, load_board
 from bubbleskin.sim.micropython import MicroPythonFirmware
 

@@ -8,6 +8,7 @@ import numpy as np
 from bubbleskin.bench.rows import Row, share_of
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.link import message
+from bubbleskin.link.reader import Reader
 
 _ROUNDS = 250  # Short ones: what else the machine does falls between some of them.
 _CALLS = 40  # In a round.
@@ -22,13 +23,13 @@ def rows(size: float = 1.0) -> Iterator[Row]:
         ("TELEMETRY of 19", "TELEMETRY", (123456, 1), [(8123, 21345, 8100, 2, 0)] * 19),
     ]
     for title, name, fixed, repeated in kinds:
-        reader = message.Reader()
+        reader = Reader()
 
         def ours(
             name: str = name,
             fixed: tuple[int, ...] = fixed,
             repeated: list[tuple[int, ...]] = repeated,
-            reader: message.Reader = reader,
+            reader: Reader = reader,
         ) -> None:
             (_message,) = reader.feed(message.encode(name, 1, fixed, repeated))
 

@@ -15,7 +15,7 @@ import serial
 from bubbleskin.bench.rows import Row, share_of
 from bubbleskin.link import message
 from bubbleskin.link.link import Link, run_sync
-from bubbleskin.link.transport import SerialTransport
+from bubbleskin.link.serial import SerialTransport
 from bubbleskin.toolchain.interpreter import find_micropython
 
 _ROUNDS = 10

@@ -15,6 +15,7 @@ from bubbleskin.connect import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
 from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
+from bubbleskin.fault_guide import guide
 from bubbleskin.shape import shapes
 from bubbleskin.shape.heightfield import Heights
 from bubbleskin.skin import Skin
@@ -100,7 +101,9 @@ def info(device: str | None, json: bool) -> None:
     for fault in facts.pop("fault_log"):
         where = "board" if fault["bubble"] is None else f"bubble {fault['bubble']}"
         seen = "" if fault["acknowledged"] else ", not acknowledged"
-        facts[f"fault {fault['id']}"] = f"{fault['name']}, {where}, at {fault['time']:.3f} s, {fault['value']:g}{seen}"
+        facts[f"fault {fault['id']}"] = (
+            f"{fault['name']}, {where}, at {fault['time']:.3f} s, {fault['value']:g}{seen}. {guide(fault['name']).remedy}."
+        )
     for name, value in facts.items():
         if name in ("tables_crc", "boot_id"):
             value = f"{value:08x}"
@@ -150,7 +153,6 @@ def show(
         elif everywhere is not None:
             asked = np.full(skin.info.bubbles, everywhere)
         state = skin.show(asked, over=over)
-        assert state is not None
         if json:
             columns = {"target_mm": state.target_mm, "height_mm": state.height_mm, "pressure_kpa": state.pressure_kpa}
             click.echo(jsonlib.dumps({name: column.tolist() for name, column in columns.items()}))

@@ -1,12 +1,20 @@
 """The command itself: its verbs, and how errors become one line and an exit status."""
 
+import contextlib
+import logging
+import os
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 import click
 
 from bubbleskin.cli import bench, device, firmware, flash, membrane, monitor, plan, play, plot, sim, store
 from bubbleskin.errors import BubbleskinError, InvalidInput
+
+LOG = "BUBBLESKIN_LOG"
+"""Environment variable: how much the link tells on standard error."""
+LOG_LEVELS = ("debug", "info", "warning", "error")
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -34,7 +42,8 @@ for _command in (
 def main(arguments: list[str] | None = None) -> Any:
     """Run the command. A user's mistake is one line and exit status 2, a device's failure 1, no tracebacks."""
     try:
-        status = bubbleskin.main(arguments, prog_name="bubbleskin", standalone_mode=False)
+        with _logging():
+            status = bubbleskin.main(arguments, prog_name="bubbleskin", standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
@@ -50,6 +59,27 @@ def main(arguments: list[str] | None = None) -> Any:
     except BrokenPipeError:  # whoever read our output has gone
         sys.stderr.close()
         sys.exit(1)
+
+
+@contextlib.contextmanager
+def _logging() -> Iterator[None]:
+    """Write what the link does to standard error, as much of it as `BUBBLESKIN_LOG` asks for."""
+    level = os.environ.get(LOG, "").lower()
+    if level and level not in LOG_LEVELS:
+        raise InvalidInput(f"{LOG} is {os.environ[LOG]!r}; give one of {', '.join(LOG_LEVELS)}, or leave it unset.")
+    if not level:
+        yield
+        return
+    logger = logging.getLogger("bubbleskin")
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    logger.addHandler(handler)
+    logger.setLevel(level.upper())
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(logging.NOTSET)
 
 
 def _end(sentence: str, status: int) -> None:

@@ -7,11 +7,11 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
-from bubbleskin.cli.options import device
+from bubbleskin.cli.options import device, gathered
 from bubbleskin.connect import connect
 from bubbleskin.errors import InvalidInput
 
@@ -20,6 +20,40 @@ if TYPE_CHECKING:  # physics and plot load scipy and matplotlib, so a verb impor
 
 F = TypeVar("F", bound=Callable[..., Any])
 DATA = click.Path(dir_okay=False, path_type=Path)
+
+
+class TableForm(NamedTuple):
+    """How tables are made: for which board, with how many knots, up to which height."""
+
+    board: str
+    knots: int
+    up_to_mm: float
+
+
+class Source(NamedTuple):
+    """Where tables come from."""
+
+    data: Path | None
+    show: Path | None
+    from_device: bool
+    bubbles: int
+
+
+class Use(NamedTuple):
+    """What is done with tables."""
+
+    output: Path | None
+    upload: bool
+    save: bool
+
+
+class Sizes(NamedTuple):
+    """Thickness and diameter of a bubble at rest."""
+
+    wall: str
+    thickness_mm: float
+    diameter_mm: float
+    diameter_is: str
 
 
 def _options(*options: Callable[[F], F]) -> Callable[[F], F]:
@@ -78,10 +112,8 @@ def picture_option(name: str) -> Callable[[F], F]:
 @click.option("-o", "--output", type=DATA, help="Write the bubbles' tables as a calibration file.")
 @click.option("--picture", type=DATA, help="Draw the fit.")
 @json_option
-def fit(
-    data: Path, board: str, knots: int, up_to_mm: float, output: Path | None, picture: Path | None,
-    as_json: bool, **options: Any,
-) -> None:  # fmt: skip
+@gathered(form=TableForm)
+def fit(data: Path, form: TableForm, output: Path | None, picture: Path | None, as_json: bool, **options: Any) -> None:
     """Fit the membrane's constants to DATA, a CSV file with units in its header.
 
     Columns: height [mm], pressure [kPa]; also bubble and step (rows of one step are repeats).
@@ -89,7 +121,7 @@ def fit(
     measurements, found = fit_file(data, **options)
     click.echo(json.dumps(found.as_dict(), indent=2) if as_json else found.report())
     if output:
-        _calibration(found, f"fit of {measurements.source}", board, knots, up_to_mm).save(output)
+        _calibration(found, f"fit of {measurements.source}", form).save(output)
         click.echo(f"wrote {output}", err=True)
     if picture:
         draw_fit(found, measurements, picture)
@@ -108,49 +140,53 @@ def fit(
 @click.option("--save", is_flag=True, help="With --upload: for good. The wristband must be vented.")
 @device
 @json_option
+@gathered(source=Source, use=Use, form=TableForm)
 def table(
-    board: str, knots: int, up_to_mm: float, data: Path | None, show: Path | None, from_device: bool,
-    compare: Path | None, bubbles: int, output: Path | None, upload: bool, save: bool, device: str | None,
-    as_json: bool, preset: str, **options: Any,
-) -> None:  # fmt: skip
+    source: Source, use: Use, form: TableForm, compare: Path | None, device: str | None, as_json: bool, **options: Any
+) -> None:
     """Make the tables that the firmware runs on: height to pressure, one per bubble.
 
     They come from a preset, from --data, from a file (--show) or from a wristband (--from-device).
     """
     from bubbleskin.membrane import Calibration
 
-    if save and not upload:
+    if use.save and not use.upload:
         raise InvalidInput("--save goes with --upload: it keeps the tables that are uploaded.")
-    if (show is not None) + (data is not None) + from_device > 1:
-        raise InvalidInput("The tables can come from one place: --data, --show or --from-device.")
-    if show:
-        calibration = Calibration.load(show)
-    elif from_device:
-        with connect(device) as skin:
-            calibration = Calibration(
-                skin.info.board, tuple(skin.read_tables()), f"read from {device or 'the wristband'}"
-            )
-    elif data:
-        sizes = {key: options[key] for key in ("wall", "thickness_mm", "diameter_mm", "diameter_is")}
-        measurements, found = fit_file(data, **sizes)
-        calibration = _calibration(found, f"fit of {measurements.source}", board, knots, up_to_mm)
-    else:
-        balloons = [balloon(preset, **options)] * bubbles
-        calibration = _calibration(balloons, balloons[0].describe() if balloons else "", board, knots, up_to_mm)
+    calibration = _find_tables(source, form, device, **options)
     click.echo(json.dumps(calibration.as_dict(), indent=2) if as_json else calibration.report())
-    if output:
-        calibration.save(output)
-        click.echo(f"wrote {output}", err=True)
-    if upload:
+    if use.output:
+        calibration.save(use.output)
+        click.echo(f"wrote {use.output}", err=True)
+    if use.upload:
         with connect(device) as skin:
-            skin.upload_tables(calibration, save)
-        until = "from now on" if save else "until it restarts"
+            skin.upload_tables(calibration, use.save)
+        until = "from now on" if use.save else "until it restarts"
         click.echo(f"{calibration.board} uses these tables, CRC {calibration.crc32:08x}, {until}", err=True)
     if compare:
         differences = calibration.differences(Calibration.load(compare))
         click.echo("\n".join(differences) or "no difference")
         if differences:
             raise SystemExit(1)
+
+
+def _find_tables(source: Source, form: TableForm, device: str | None, preset: str, **options: Any) -> Calibration:
+    """The tables of the one source that was named, or of a preset."""
+    from bubbleskin.membrane import Calibration
+
+    if (source.show is not None) + (source.data is not None) + source.from_device > 1:
+        raise InvalidInput("The tables can come from one place: --data, --show or --from-device.")
+    if source.show:
+        return Calibration.load(source.show)
+    if source.from_device:
+        with connect(device) as skin:
+            origin = f"read from {device or 'the wristband'}"
+            return Calibration(skin.info.board, tuple(skin.read_tables()), origin)
+    if source.data:
+        sizes = {field: options[field] for field in Sizes._fields}
+        measurements, found = fit_file(source.data, **sizes)
+        return _calibration(found, f"fit of {measurements.source}", form)
+    balloons = [balloon(preset, **options)] * source.bubbles
+    return _calibration(balloons, balloons[0].describe() if balloons else "", form)
 
 
 commands = [fit, table]
@@ -174,24 +210,22 @@ def fit_file(
     pooled: bool = False,
     height_noise_mm: float = 0.05,
     pressure_noise_kpa: float = 0.15,
-    thickness_mm: float,
-    diameter_mm: float,
-    diameter_is: str,
-    wall: str,
+    **sizes: Any,
 ) -> tuple[Measurements, YeohFit | SheetFit]:
     """Read a file of measurements and fit it as its options say."""
     from bubbleskin.membrane import Noise, fit_measurements, read_csv
 
+    size = Sizes(**sizes)
     with _said():
         measurements = read_csv(data, skip_bad_rows=skip_bad_rows)
         return measurements, fit_measurements(
             measurements,
             pooled=pooled,
             noise=Noise(height_noise_mm * 1e-3, pressure_noise_kpa * 1e3),
-            thickness=thickness_mm * 1e-3,
-            radius=diameter_mm * 0.5e-3,
-            wall=wall,
-            surface=diameter_is,
+            thickness=size.thickness_mm * 1e-3,
+            radius=size.diameter_mm * 0.5e-3,
+            wall=size.wall,
+            surface=size.diameter_is,
         )
 
 
@@ -219,15 +253,13 @@ def balloon(
     )
 
 
-def _calibration(
-    found: YeohFit | SheetFit | list[YeohBalloon], source: str, board: str, knots: int, up_to_mm: float
-) -> Calibration:
+def _calibration(found: YeohFit | SheetFit | list[YeohBalloon], source: str, form: TableForm) -> Calibration:
     from bubbleskin.membrane import Calibration
 
     balloons = found if isinstance(found, list) else found.balloons
     if not balloons:
         raise InvalidInput("--bubbles must be 1 or more.")
-    return Calibration.build(board, balloons, source=source, height_mm=(5.0, up_to_mm), knots=knots)
+    return Calibration.build(form.board, balloons, source=source, height_mm=(5.0, form.up_to_mm), knots=form.knots)
 
 
 def draw_fit(found: YeohFit | SheetFit, measurements: Measurements, output: Path) -> None:

@@ -53,7 +53,6 @@ def play(what: str, loops: int | None, at: float | None, device: str | None, jso
             skin.stop()
             skin.vent()
             raise
-    assert played is not None
     if json:
         click.echo(jsonlib.dumps(dataclasses.asdict(played)))
     else:

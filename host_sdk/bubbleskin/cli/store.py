@@ -13,7 +13,7 @@ from bubbleskin.errors import InvalidInput
 
 
 @click.command()
-@click.option("--save", is_flag=True, help="Keep the tables, figures and settings that are in use.")
+@click.option("--save", is_flag=True, help="Keep the tables, trim and settings that are in use.")
 @click.option("--reset", is_flag=True, help="Forget what is kept; use what the firmware was made with.")
 @device
 @as_json

@@ -18,7 +18,7 @@ Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
 
 
-def check(drive: Path) -> None:
+def check_drive(drive: Path) -> None:
     """Refuse a folder that is no boot loader's drive, or that of another chip."""
     try:
         text = (drive / INFO).read_text(errors="replace")
@@ -36,7 +36,7 @@ def check(drive: Path) -> None:
         )
 
 
-def copy(machine: Machine, drive: Path, image: Image, report: Progress) -> None:
+def copy_image(machine: Machine, drive: Path, image: Image, report: Progress) -> None:
     """Copy `image` onto `drive` and leave the board to start it. Errors say how the board is left and what to do."""
     data = image.for_drive()
     try:

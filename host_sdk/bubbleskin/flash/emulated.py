@@ -13,6 +13,7 @@ from typing import Any
 from bubbleskin.errors import LinkError
 from bubbleskin.flash.machine import Connection, Machine, Sink
 from bubbleskin.sim.board import load_board
+from bubbleskin.sim.rp2040.board import pass_over_carrier
 from bubbleskin.sim.rp2040.boot_rom import INFO, BootRom, starts
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import Chip
@@ -22,10 +23,8 @@ PORT = "emulated"
 FLASH_SIZE = 2 << 20
 _STEP = 2e-4
 """Emulated seconds between two looks at what has come."""
-_PATIENCE = 10.0
+_READ_S = 10.0
 """Emulated seconds that a read of the port waits."""
-_PUMP_SLICE = 7
-"""Of the PWM: its carrier would be most of the emulator's events, and nobody looks at it."""
 
 
 class EmulatedMachine(Machine):
@@ -59,9 +58,7 @@ class EmulatedMachine(Machine):
         for pin, _ in data.CONVERTERS:
             spi.add(Mcp3208(lambda channel: data.SENSOR_ZERO), pin)
         chip.mcu.gpio[data.PIN_ESTOP].set_input_value(False)
-        carrier = chip.mcu.pwm.channels[_PUMP_SLICE]
-        for alarm in (carrier.alarm_a, carrier.alarm_b, carrier.alarm_bottom):
-            alarm.enable = False
+        pass_over_carrier(chip, data)
         self.on_chip(chip)
 
     def pull_out(self) -> None:
@@ -203,7 +200,7 @@ class EmulatedPort:
     def read(self, count: int = 1) -> bytes:
         """`count` bytes, fewer where they do not come."""
         self._asked = False
-        self._connection.wait(_PATIENCE, count)
+        self._connection.wait(_READ_S, count)
         return self._connection.take(count)
 
     def write(self, data: bytes) -> int:

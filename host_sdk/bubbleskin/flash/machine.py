@@ -12,7 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from bubbleskin.link.transport import SerialTransport, Transport, attached
+from bubbleskin.link.serial import SerialTransport, attached
+from bubbleskin.link.transport import Transport
 
 INFO = "INFO_UF2.TXT"
 """The file by which a boot loader's drive is known."""

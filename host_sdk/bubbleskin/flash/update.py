@@ -8,9 +8,9 @@ from pathlib import Path
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.device.info import Info
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError, WrongDevice
-from bubbleskin.flash import drive as drives
 from bubbleskin.flash import mpy, slots, uf2
-from bubbleskin.flash.kept import Kept, UnderWay
+from bubbleskin.flash.drive import Progress, check_drive, copy_image
+from bubbleskin.flash.history import History, UnderWay
 from bubbleskin.flash.machine import Connection, Machine
 from bubbleskin.flash.prompt import Prompt
 from bubbleskin.link.link import run_sync
@@ -50,15 +50,15 @@ class Outcome:
 def flash(
     machine: Machine,
     order: Order,
-    report: drives.Progress = lambda title, done, total: None,
+    report: Progress = lambda title, done, total: None,
     *,
     build: Callable[[str], Path] = lambda board: firmware([board])[board],
     files: Callable[[str], dict[str, bytes]] = mpy.files,
-    kept: Path | None = None,
+    history: Path | None = None,
 ) -> Outcome:
     """Do what `order` says to the one board that is meant.
 
-    `build` gives the UF2 of a board, `files` its .mpy files, `kept` is the folder of UF2s known to work. Raises
+    `build` gives the UF2 of a board, `files` its .mpy files, `history` is the folder of UF2s known to work. Raises
     `InvalidInput` where it is not clear what is meant, other `BubbleskinError`s where it could not be done; their
     sentences say how the board is left and what to do.
     """
@@ -66,7 +66,7 @@ def flash(
         raise InvalidInput("Say one of --uf2, --mpy and --previous, or none: then today's firmware is taken.")
     if order.device and order.drive:
         raise InvalidInput("Say --device for a board that runs, or --drive for one in its boot loader, not both.")
-    return _Update(machine, order, report, build, files, kept).run()
+    return _Update(machine, order, report, build, files, history).run()
 
 
 class _Update:
@@ -74,18 +74,18 @@ class _Update:
         self,
         machine: Machine,
         order: Order,
-        report: drives.Progress,
+        report: Progress,
         build: Callable[[str], Path],
         files: Callable[[str], dict[str, bytes]],
-        kept: Path | None,
+        history: Path | None,
     ):
         self.machine = machine
         self.order = order
         self.report = report
         self.build = build
         self.files = files
-        self.kept = kept
-        self.under_way = UnderWay(kept)
+        self.history = history
+        self.under_way = UnderWay(history)
         self.others: set[str] = set()  # ports of boards that are not meant
         self.unlisted = False  # whether the port is a socket, a link or anything else that `ports` does not tell of
         self.port = ""
@@ -220,34 +220,36 @@ class _Update:
                 )
             return uf2.read(order.uf2)
         if order.previous:
-            path = Kept(self.board(), self.kept).previous()
+            path = History(self.board(), self.history).previous()
             if path is None:
                 raise InvalidInput(
-                    f"No earlier firmware of a {self.board()} is kept on this computer. Give a file: --uf2 FILE."
+                    f"No earlier firmware of a {self.board()} is on this computer. Give a file: --uf2 FILE."
                 )
             return uf2.read(path)
         return uf2.read(self.build(self.board()))
 
     def by_uf2(self, drive: Path) -> Outcome:
-        drives.check(drive)
+        check_drive(drive)
         image = self.image()
         board = self.board()
-        kept = Kept(board, self.kept)
+        history = History(board, self.history)
         known = b"".join(
             uf2.block(n, len(image.pages), uf2.FLASH_AT + uf2.PAGE * n, p) for n, p in enumerate(image.pages)
         )
-        kept.tried(known)
+        history.tried(known)
         self.under_way.begin(board)
-        drives.copy(self.machine, drive, image, self.report)
+        copy_image(self.machine, drive, image, self.report)
         back = (
-            "; `bubbleskin flash --previous` then brings the last firmware back that worked" if kept.previous() else ""
+            "; `bubbleskin flash --previous` then brings the last firmware back that worked"
+            if history.previous()
+            else ""
         )
         remedy = f"To try again, {BOOTSEL}{back}."
         info = self.wait_for_hello(
             f"The firmware has been copied, but no wristband answers within {_BACK_S:g} s. {remedy}"
         )
         self.check_answer(info, board, remedy)
-        kept.remember(known)
+        history.remember(known)
         self.under_way.end()
         return Outcome("uf2", info, self.old.firmware if self.old else None)
 
@@ -350,13 +352,13 @@ class _Update:
         """Restart, see the firmware in `slot` answer, and make it end; its prompt."""
         self.reset(prompt)
         board = self.board()
-        kept = "The board keeps what it had: nothing but the new files has changed."
+        unchanged = "The board keeps what it had: nothing but the new files has changed."
         try:
-            info = self.wait_for_hello(f"The new firmware does not answer within {_BACK_S:g} s. {kept}")
+            info = self.wait_for_hello(f"The new firmware does not answer within {_BACK_S:g} s. {unchanged}")
         except LinkError as silence:
             raise LinkError(f"{silence} {self.why()}") from None
         try:
-            self.check_answer(info, board, kept)
+            self.check_answer(info, board, unchanged)
         except BubbleskinError:
             self.restart("firmware")  # which is the old one again: the trial is over
             raise
@@ -365,7 +367,7 @@ class _Update:
         started, problem = slots.running(prompt)
         if started != slot:
             self.reset(prompt)
-            raise BubbleskinError(f"The new firmware has not started ({problem}), and the old one runs. {kept}")
+            raise BubbleskinError(f"The new firmware has not started ({problem}), and the old one runs. {unchanged}")
         return prompt
 
     def why(self) -> str:

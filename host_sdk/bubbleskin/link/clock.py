@@ -20,9 +20,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bubble_protocol.schema.system import TICKS_WRAP
 from bubbleskin.errors import LinkError
 from bubbleskin.link.message import Message
 
+PINGS = 20
+"""Round trips after which a clock that has just begun knows enough."""
 WINDOW = 60.0
 """Seconds of round trips that are kept, before the newest."""
 DRIFT = 200e-6
@@ -34,8 +37,10 @@ _WRAP = 1 << 30
 """Ticks are compared modulo this, which divides 2³²: half of it, 31 days of ticks, may pass between two pings."""
 _BUCKETS = 60
 """Of the round trips in a 60th of the window, only the best each way are kept: less to reckon, next to nothing lost."""
-_RESOLUTION = 1e-6  # seconds: the device's time is told in whole µs, rounded down
+_RESOLUTION = 1e-6
+"""Seconds: the device's time is told in whole µs, rounded down."""
 _HALVINGS = 40
+"""Thirds that a search takes away from its interval: (2/3)⁴⁰ of it is left, 10⁻⁷."""
 
 
 class _Best(NamedTuple):
@@ -206,6 +211,28 @@ class Clock:
         at_low = drift_low if a.min() >= 0 else _least(lambda d: float((low + d * a).max()), drift_low, drift_high)
         at_high = drift_high if b.min() >= 0 else _least(lambda d: -float((high + d * b).min()), drift_low, drift_high)
         return _Bounds((low + at_low * a).max(), (high + at_high * b).min(), drift_low, drift_high)
+
+
+class DeviceTicks:
+    """Makes the `ticks` of messages count on: a wristband counts up to 2³⁰ and goes on from 0, after 62 days at 5 ms.
+
+    Right as long as two messages are less than half of that apart.
+    """
+
+    def __init__(self) -> None:
+        self._latest: int | None = None
+
+    def unwrap(self, message: Message) -> None:
+        """Replace the `ticks` of this message, where it has some, by those since boot or since the link was opened."""
+        ticks = message.fields.get("ticks")
+        if not isinstance(ticks, int):
+            return
+        if self._latest is not None:
+            ahead = (ticks - self._latest) % TICKS_WRAP
+            if ahead >= TICKS_WRAP // 2:  # a message that was overtaken, or a wristband that has started again
+                ahead -= TICKS_WRAP
+            ticks = max(self._latest + ahead, 0)
+        message.fields["ticks"] = self._latest = ticks
 
 
 def _least(value: Callable[[float], float], left: float, right: float) -> float:

@@ -1,5 +1,6 @@
 """Requests of one session: their numbers, a window of them under way, and when to send again. No I/O, no clock."""
 
+import logging
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -10,11 +11,14 @@ from bubble_protocol.frame import NO_KEY
 from bubble_protocol.schema import messages
 from bubbleskin.errors import BubbleskinError, Overtaken
 from bubbleskin.link.message import Message, encode
+from bubbleskin.link.rtt import RttEstimator
+
+_log = logging.getLogger(__name__)
 
 URGENT = ("STOP", "VENT")
 BYTES = 512
-"""In flight at most, beside one request: a VENT sent now waits no longer than these take to be read."""
-KEPT = 16
+"""Bytes in flight at most, beside one request: a VENT sent now waits no longer than these take to be read."""
+REPLIES_KEPT = 16
 """Replies that a device keeps: STOP and VENT may be so far ahead of the oldest request without an answer."""
 LOST = 3
 """Times that a request is sent before the device is asked whether it still is the same."""
@@ -22,7 +26,11 @@ LOST = 3
 
 @dataclass(eq=False)
 class Request:
-    """One request, from the call to its answer. `deadline`: when the caller gives up, after `allowed` seconds."""
+    """One request, from the call to its answer. All times are in s, on the transport's clock.
+
+    `name`, `fixed` and `repeated` are those of `bubbleskin.link.message.encode`. `deadline`: when the caller gives up, after
+    `allowed` seconds.
+    """
 
     name: str
     fixed: Sequence[int]
@@ -33,11 +41,15 @@ class Request:
     """Counts on without end; on the wire modulo 65536. -1: not sent."""
     frame: bytes = b""
     sends: int = 0
+    """How often it has been sent."""
     sent: float = 0.0
+    """When it was sent first."""
     resent: float = 0.0
+    """When it was sent last."""
     due: float = 0.0
     """When it is sent again."""
     patience: float = 0.0
+    """Seconds from `resent` to `due`."""
     reply: Message | None = None
     error: BubbleskinError | None = None
     id: int = field(init=False)
@@ -56,56 +68,24 @@ class Request:
         return self.name in URGENT
 
 
-class RoundTrip:
-    """How long to wait for an answer before sending again: RFC 6298, with Karn's rule. Seconds.
+class SendWindow:
+    """The requests that wait and those under way. `rtt` learns from their answers how long those take."""
 
-    Only answers to what was sent once, or that tell which sending they answer as those to PING and HELLO do, are
-    measured; so waiting longer for one request says nothing of the next.
-    """
-
-    FIRST = 0.25
-    FLOOR = 0.03
-    MOST = 0.25
-
-    def __init__(self) -> None:
-        self.smoothed: float | None = None
-        self.variation = 0.0
-
-    @property
-    def timeout(self) -> float:
-        """For a request that is sent now."""
-        if self.smoothed is None:
-            return self.FIRST
-        return max(self.FLOOR, self.smoothed + 4 * self.variation)
-
-    def longer(self, patience: float) -> float:
-        """How long to wait the next time, when nothing has come within `patience`."""
-        return min(2 * patience, max(self.MOST, self.timeout))
-
-    def measured(self, seconds: float) -> None:
-        """An answer came after so long."""
-        if self.smoothed is None:
-            self.smoothed, self.variation = seconds, seconds / 2
-        else:
-            self.variation += (abs(self.smoothed - seconds) - self.variation) / 4
-            self.smoothed += (seconds - self.smoothed) / 8
-
-
-class Window:
-    """The requests that wait and those under way. `size`: how many the device takes at once."""
-
-    def __init__(self) -> None:
-        self.trip = RoundTrip()
+    def __init__(self, rtt: RttEstimator) -> None:
         self.size = 1
+        """How many requests the device takes at once."""
         self.key = NO_KEY
-        self._next = 1
+        """What the CRCs of the open session's frames are mixed with."""
+        self.next_number = 1
+        """Of the next request."""
+        self._rtt = rtt
         self._waiting: deque[Request] = deque()
         self._flight: dict[int, Request] = {}  # by the number on the wire, oldest first
 
     def begin(self, key: bytes, size: int) -> None:
         """A new session: numbers begin anew. Nothing may be in flight; what waits goes on waiting."""
         assert not self._flight
-        self.key, self.size, self._next = key, size, 1
+        self.key, self.size, self.next_number = key, size, 1
 
     def submit(self, request: Request) -> None:
         """Take a request; it is sent when its turn comes. An urgent one ends all that wait."""
@@ -128,16 +108,16 @@ class Window:
         for request in self._flight.values():
             if request.due <= now:
                 if now >= request.resent + request.patience:
-                    request.patience = self.trip.longer(request.patience)
+                    request.patience = self._rtt.backoff(request.patience)
                 frames.append(self._send(request, now))
         while self._waiting and self._has_room(self._waiting[0]):
             request = self._waiting.popleft()
-            request.number = self._next
-            self._next += 1
+            request.number = self.next_number
+            self.next_number += 1
             sequence = request.number & 0xFFFF
             request.frame = encode(request.name, sequence, request.fixed, request.repeated, self.key)
             request.sent = now
-            request.patience = self.trip.timeout
+            request.patience = self._rtt.timeout
             self._flight[sequence] = request
             frames.append(self._send(request, now))
         return b"".join(frames)
@@ -172,7 +152,7 @@ class Window:
             return
         del self._flight[message.sequence]
         if request.sends == 1:
-            self.trip.measured(now - request.sent)
+            self._rtt.update(now - request.sent)
         request.reply = message
         # The device keeps the order: what is older has been answered too, or overtaken, and the answer got lost.
         for other in self._flight.values():
@@ -195,13 +175,17 @@ class Window:
     def _has_room(self, request: Request) -> bool:
         if not self._flight:
             return True
-        ahead = self._next - self._oldest().number
+        ahead = self.next_number - self._oldest().number
         if request.urgent:
-            return ahead < KEPT
+            return ahead < REPLIES_KEPT
         return ahead < self.size and sum(len(other.frame) for other in self._flight.values()) < BYTES
 
     def _send(self, request: Request, now: float) -> bytes:
         request.sends += 1
         request.resent = now
         request.due = now + request.patience
+        if request.sends > 1:
+            _log.info("%s %d is sent again, %d times so far", request.name, request.number & 0xFFFF, request.sends)
+        if _log.isEnabledFor(logging.DEBUG):
+            _log.debug("sent %s %d, %d bytes", request.name, request.number & 0xFFFF, len(request.frame))
         return request.frame

@@ -45,8 +45,8 @@ class Columns(Mapping[str, NDArray[np.int64]]):
         return len(self._row.names or ())
 
 
-class Packing:
-    """How one message is packed."""
+class StructCodec:
+    """Packs and unpacks the payloads of one message."""
 
     def __init__(self, message: codec.Message):
         self.message = message
@@ -80,5 +80,5 @@ class Packing:
         return fields, Columns(bytes(frame[start : start + count * self._row.itemsize]), self._row)
 
 
-BY_ID = {message_id: Packing(message) for message_id, message in codec.BY_ID.items()}
-BY_NAME = {packing.message.name: packing for packing in BY_ID.values()}
+BY_ID = {message_id: StructCodec(message) for message_id, message in codec.BY_ID.items()}
+BY_NAME = {entry.message.name: entry for entry in BY_ID.values()}

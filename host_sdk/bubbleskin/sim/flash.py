@@ -3,10 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from bubble_firmware.drivers.flash import PAGE, SECTOR
 from bubbleskin.errors import InvalidInput
-
-SECTOR = 4096
-PAGE = 256
 
 Remains = Callable[[bytes, bytes], bytes]
 """What a cut leaves of one operation, from the bytes before it and those that it would have left."""

@@ -1,6 +1,8 @@
-"""The equations of the plant, compiled: two loops over the bubbles, written for one bubble at a time.
+"""The equations of the plant, compiled: loops over the bubbles, written for one bubble at a time.
 
-State and figures are arrays of records, one per bubble, so that the code reads like the equations.
+State and constants are arrays of records, one per bubble, so that the code reads like the equations. `bubbles` is (state,
+constants), `reservoir` (air, supply), `coils` the seconds for which fill and vent have current, `contact` (place, necks,
+springs, pairs, force) as of `bubbleskin.contact.energy`; without contact its arrays are empty.
 """
 
 import inspect
@@ -50,6 +52,93 @@ _open_fraction = njit(pneumatics.open_fraction)
 _sensor_counts = njit(pneumatics.sensor_counts)
 
 
+@njit(inline="always")
+def _set_windows(bubbles, coils, dt):  # type: ignore[no-untyped-def]
+    """When each valve is open within the next `dt` s, from how long its coil has current."""
+    state, constants = bubbles
+    fill_on, vent_on = coils
+    for i in range(len(state)):
+        s, p = state[i], constants[i]
+        s.fill_start, s.fill_stop, s.fill_energised, s.fill_open, s.fill_since = _valve_window(
+            s.fill_energised, s.fill_open, s.fill_since, fill_on[i], dt, p.fill_opening, p.fill_closing
+        )
+        if s.fill_stuck != 0.0:
+            s.fill_start, s.fill_stop = 0.0, dt if s.fill_stuck > 0.0 else 0.0
+        s.vent_start, s.vent_stop, s.vent_energised, s.vent_open, s.vent_since = _valve_window(
+            s.vent_energised, s.vent_open, s.vent_since, vent_on[i], dt, p.vent_opening, p.vent_closing
+        )
+        if s.vent_stuck != 0.0:
+            s.vent_start, s.vent_stop = 0.0, dt if s.vent_stuck > 0.0 else 0.0
+
+
+@njit(inline="always")
+def _move_centres(contact, h):  # type: ignore[no-untyped-def]
+    """Let centres follow the forces of necks, base and neighbours for `h` s; what is left of them acts on the membranes."""
+    place, necks, springs, pairs, force = contact
+    force[:] = 0.0
+    _mechanics(place, necks, springs[0], pairs, force)
+    for i in range(len(place)):
+        c = place[i]
+        kz = springs[0].kz_up if c[2] > c[3] else springs[0].kz_down
+        c[0] -= h * force[i, 0] / (DRAG + h * springs[0].kxy)
+        c[1] -= h * force[i, 1] / (DRAG + h * springs[0].kxy)
+        c[2] -= h * force[i, 2] / (DRAG + h * kz)
+
+
+@njit(inline="always")
+def _flows(s, p, source, b, t, h):  # type: ignore[no-untyped-def]
+    """RTṁ of a bubble's ways in and out from `t` to `t + h` s, W: fill from `source` Pa, vent, tube, and what is lost."""
+    fill = vent = lost = 0.0
+    fraction = _open_fraction(s.fill_start, s.fill_stop, t, h)
+    if fraction > 0.0:
+        fill = fraction * _orifice_flow(source, s.node, p.fill_conductance, b)
+    fraction = _open_fraction(s.vent_start, s.vent_stop, t, h)
+    if fraction > 0.0:
+        vent = fraction * _orifice_flow(s.node, ATMOSPHERE, p.vent_conductance, b)
+    tube = _tube_flow(s.node, s.pressure, p.tube_resistance)
+    if s.leak > 0.0:
+        lost = s.leak * (s.pressure - ATMOSPHERE)
+    if s.pop_off > 0.0:
+        lost += _orifice_flow(s.pressure, ATMOSPHERE, s.pop_off * OPEN_LINE, b)
+    return fill, vent, tube, lost
+
+
+@njit(inline="always")
+def _stretch(s, p, load, h):  # type: ignore[no-untyped-def]
+    """Let the membrane give way for `h` s under `load` Pa from outside; volumes before and after, m³.
+
+    η dλ/dt = p − P(λ) − F/(4πR²), F what necks, base and neighbours press on the sphere with.
+    """
+    sphere = 4.0 / 3.0 * math.pi * p.radius * p.radius * p.radius
+    before = p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
+    membrane = _yeoh_pressure(s.stretch, p.mu, p.c2, p.c3, p.thickness, p.radius) + load
+    stretch = s.stretch + h * (s.pressure - ATMOSPHERE - membrane) / p.viscosity
+    s.stretch = min(max(stretch, STRETCH_MIN), STRETCH_MAX)
+    return before, p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
+
+
+@njit(inline="always")
+def _step_bubbles(bubbles, contact, source, supply, dumped, t, h):  # type: ignore[no-untyped-def]
+    """Every bubble from `t` to `t + h` s on a reservoir at `source` Pa that has `dumped`: what is drawn and vented, W."""
+    state, constants = bubbles
+    place, force = contact[0], contact[4]
+    n = supply.polytropic
+    drawn = vented = dumped
+    for i in range(len(state)):
+        s, p = state[i], constants[i]
+        fill, vent, tube, lost = _flows(s, p, source, supply.critical_ratio, t, h)
+        load = force[i, 3] / (4.0 * math.pi * place[i, 3] * place[i, 3]) if len(place) else 0.0
+        before, volume = _stretch(s, p, load, h)
+        if len(place):
+            place[i, 3] = p.radius * s.stretch
+        # dp/dt = n/V (RTṁ − p dV/dt); the new V and the old p, so that n = 1 keeps pV exactly
+        s.node += n * h * (fill - vent - tube) / p.node_volume
+        s.pressure += n * (h * (tube - lost) - s.pressure * (volume - before)) / volume
+        drawn += fill
+        vented += vent + lost
+    return drawn, vented
+
+
 def _compile(stamp: int):  # type: ignore[no-untyped-def]
     """Compile `advance` and `sense`, which are documented where `Plant` calls them.
 
@@ -58,92 +147,20 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
     """
 
     @njit(cache=True)
-    def advance(  # type: ignore[no-untyped-def]
-        state,
-        constants,
-        airs,
-        supplies,
-        fill_on,
-        vent_on,
-        dt,
-        substeps,
-        pump,
-        dump,
-        place,
-        necks,
-        springs,
-        pairs,
-        force,
-    ):
+    def advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump):  # type: ignore[no-untyped-def]
         _ = stamp
-        air, supply = airs[0], supplies[0]
+        air, supply = reservoir[0][0], reservoir[1][0]
         h = dt / substeps
-        n = supply.polytropic
-        b = supply.critical_ratio
-
-        for i in range(len(state)):
-            s, p = state[i], constants[i]
-            s.fill_start, s.fill_stop, s.fill_energised, s.fill_open, s.fill_since = _valve_window(
-                s.fill_energised, s.fill_open, s.fill_since, fill_on[i], dt, p.fill_opening, p.fill_closing
-            )
-            if s.fill_stuck != 0.0:
-                s.fill_start, s.fill_stop = 0.0, dt if s.fill_stuck > 0.0 else 0.0
-            s.vent_start, s.vent_stop, s.vent_energised, s.vent_open, s.vent_since = _valve_window(
-                s.vent_energised, s.vent_open, s.vent_since, vent_on[i], dt, p.vent_opening, p.vent_closing
-            )
-            if s.vent_stuck != 0.0:
-                s.vent_start, s.vent_stop = 0.0, dt if s.vent_stuck > 0.0 else 0.0
-
+        _set_windows(bubbles, coils, dt)
         for k in range(substeps):
-            t = k * h
             pumped = _pump_flow(air.pressure - ATMOSPHERE, pump, supply.pump_free_flow, supply.pump_stall)
-            vented = _orifice_flow(air.pressure, ATMOSPHERE, supply.dump_conductance, b) if dump else 0.0
-            drawn = vented
-            if len(
-                place
-            ):  # centres follow the forces of necks, base and neighbours; what is left acts on the membranes
-                force[:] = 0.0
-                _mechanics(place, necks, springs[0], pairs, force)
-                for i in range(len(place)):
-                    c = place[i]
-                    kz = springs[0].kz_up if c[2] > c[3] else springs[0].kz_down
-                    c[0] -= h * force[i, 0] / (DRAG + h * springs[0].kxy)
-                    c[1] -= h * force[i, 1] / (DRAG + h * springs[0].kxy)
-                    c[2] -= h * force[i, 2] / (DRAG + h * kz)
-            for i in range(len(state)):
-                s, p = state[i], constants[i]
-                # RTṁ of the bubble's ways in and out, W
-                fill = vent = lost = 0.0
-                fraction = _open_fraction(s.fill_start, s.fill_stop, t, h)
-                if fraction > 0.0:
-                    fill = fraction * _orifice_flow(air.pressure, s.node, p.fill_conductance, b)
-                fraction = _open_fraction(s.vent_start, s.vent_stop, t, h)
-                if fraction > 0.0:
-                    vent = fraction * _orifice_flow(s.node, ATMOSPHERE, p.vent_conductance, b)
-                tube = _tube_flow(s.node, s.pressure, p.tube_resistance)
-                if s.leak > 0.0:
-                    lost = s.leak * (s.pressure - ATMOSPHERE)
-                if s.pop_off > 0.0:
-                    lost += _orifice_flow(s.pressure, ATMOSPHERE, s.pop_off * OPEN_LINE, b)
-
-                # η dλ/dt = p − P(λ) − F/(4πR²), F what necks, base and neighbours press on the sphere with
-                sphere = 4.0 / 3.0 * math.pi * p.radius * p.radius * p.radius
-                before = p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
-                membrane = _yeoh_pressure(s.stretch, p.mu, p.c2, p.c3, p.thickness, p.radius)
-                if len(place):
-                    membrane += force[i, 3] / (4.0 * math.pi * place[i, 3] * place[i, 3])
-                stretch = s.stretch + h * (s.pressure - ATMOSPHERE - membrane) / p.viscosity
-                s.stretch = min(max(stretch, STRETCH_MIN), STRETCH_MAX)
-                if len(place):
-                    place[i, 3] = p.radius * s.stretch
-                volume = p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
-
-                # dp/dt = n/V (RTṁ − p dV/dt); the new V and the old p, so that n = 1 keeps pV exactly
-                s.node += n * h * (fill - vent - tube) / p.node_volume
-                s.pressure += n * (h * (tube - lost) - s.pressure * (volume - before)) / volume
-                drawn += fill
-                vented += vent + lost
-            air.pressure += n * h * (pumped - drawn) / supply.volume
+            dumped = 0.0
+            if dump:
+                dumped = _orifice_flow(air.pressure, ATMOSPHERE, supply.dump_conductance, supply.critical_ratio)
+            if len(contact[0]):
+                _move_centres(contact, h)
+            drawn, vented = _step_bubbles(bubbles, contact, air.pressure, supply, dumped, k * h, h)
+            air.pressure += supply.polytropic * h * (pumped - drawn) / supply.volume
             air.pumped += h * pumped
             air.vented += h * vented
 

@@ -87,6 +87,12 @@ class Plant:
             self._pairs = np.argwhere(np.triu(gap < REACH, 1))
             self._stand()
 
+        # The arrays as the kernel takes them: their content changes, they themselves do not.
+        self._bubbles = (self._state, self._constants)
+        self._reservoir = (self._air, self._supply)
+        self._coils = (self._fill_on, self._vent_on)
+        self._contact = (self._place, self._necks, self._springs, self._pairs, self._force)
+
     def _stand(self) -> None:
         """Put every bubble on its barb, touching the base."""
         if len(self._place):
@@ -108,21 +114,7 @@ class Plant:
         substeps = max(1, math.ceil(dt / self._substep - 1e-6))
         if dt > 0.0:
             kernel.advance(
-                self._state,
-                self._constants,
-                self._air,
-                self._supply,
-                self._fill_on,
-                self._vent_on,
-                float(dt),
-                substeps,
-                float(pump),
-                bool(dump),
-                self._place,
-                self._necks,
-                self._springs,
-                self._pairs,
-                self._force,
+                self._bubbles, self._reservoir, self._contact, self._coils, float(dt), substeps, float(pump), bool(dump)
             )
         self.time += dt
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +12,24 @@ from bubbleskin.errors import LinkError
 from bubbleskin.sim.board import Simulated
 from bubbleskin.sim.rp2040.banks import Bank, Pca9685Bank, PwmBank
 from bubbleskin.sim.rp2040.bus import SpiBus
-from bubbleskin.sim.rp2040.chip import Chip
+from bubbleskin.sim.rp2040.chip import BOOT_S, Chip
 from bubbleskin.sim.rp2040.mcp3208 import Mcp3208
 from bubbleskin.sim.rp2040.valves import FILL, VENT, Valves
 
-_BOOT_S = 5.0
-"""Emulated seconds within which it must appear on USB; it takes a fifth of one."""
-_PUMP_SLICE = 7
-
 FAILURES = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
 """What can be made to fail beside what `Plant.inject` knows."""
+
+
+def pump_carrier(chip: Chip, data: ModuleType) -> Any:
+    """The emulator's PWM slice at the pump's pin (RP2040 datasheet, table 525: two pins a slice, eight slices)."""
+    return chip.mcu.pwm.channels[data.PIN_PUMP >> 1 & 7]
+
+
+def pass_over_carrier(chip: Chip, data: ModuleType) -> None:
+    """Let the emulator take no notice of the pump's carrier: nobody does, and it would be most of its events."""
+    carrier = pump_carrier(chip, data)
+    for alarm in (carrier.alarm_a, carrier.alarm_b, carrier.alarm_bottom):
+        alarm.enable = False
 
 
 class Rp2040Board(Simulated):
@@ -77,10 +86,7 @@ class Rp2040Board(Simulated):
             convert(channel)
 
         chip.mcu.adc.on_adc_read = read
-        # The pump's carrier is of no interest, and would be most of the emulator's events.
-        carrier = chip.mcu.pwm.channels[_PUMP_SLICE]
-        for alarm in (carrier.alarm_a, carrier.alarm_b, carrier.alarm_bottom):
-            alarm.enable = False
+        pass_over_carrier(chip, data)
 
     def _input(self, first: int, inputs: int) -> Callable[[int], int]:
         def sample(channel: int) -> int:
@@ -96,7 +102,7 @@ class Rp2040Board(Simulated):
                 self._drive(bubble)
 
     def _pump_duty(self) -> float:
-        carrier = self.chip.mcu.pwm.channels[_PUMP_SLICE]
+        carrier = pump_carrier(self.chip, self.data)
         if self._supply_lost or not carrier.csr & 1 or self.chip.mcu.gpio[self.data.PIN_PUMP].function_select != 4:
             return 0.0
         return min((carrier.cc & 0xFFFF) / (carrier.top + 1), 1.0)
@@ -130,8 +136,8 @@ class Rp2040Board(Simulated):
         """Run until the chip has appeared on USB; `LinkError` where it does not."""
         while not self.chip.connected:
             self.chip.run(self.tick_s)
-            if self.time > _BOOT_S:
-                raise LinkError(f"The emulated board has not appeared on USB within {_BOOT_S:g} emulated seconds.")
+            if self.time > BOOT_S:
+                raise LinkError(f"The emulated board has not appeared on USB within {BOOT_S:g} emulated seconds.")
 
     def tick(self) -> None:
         """Let as much time pass as one period takes; periods themselves are the chip's affair."""

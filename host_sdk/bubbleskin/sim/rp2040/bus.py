@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-_NANOS = 1e9
+NANOS = 1e9
 _SPI_GAP = 1.5
 """Bit times between two words: the PL022 lifts its own select between them in mode 0."""
 _IC_FS_SPKLEN = 0xA0
@@ -48,7 +48,7 @@ class SpiBus:
 
     def _transmit(self, byte: int) -> None:
         self._byte = byte
-        self._done.schedule((self._spi.data_bits + _SPI_GAP) * _NANOS / self._spi.clock_frequency)
+        self._done.schedule((self._spi.data_bits + _SPI_GAP) * NANOS / self._spi.clock_frequency)
 
     def _complete(self) -> None:
         answer = 0xFF
@@ -101,7 +101,7 @@ class I2cBus:
         # The bit of the DW_apb_i2c: RP2040 datasheet, 4.3.14.1.
         clocks = i2c.scl_high_period + i2c.read_uint32(_IC_FS_SPKLEN) + 7 + i2c.scl_low_period + 1
         self._next = then
-        self._alarm.schedule(bits * clocks * _NANOS / i2c.rp2040.clk_sys)
+        self._alarm.schedule(bits * clocks * NANOS / i2c.rp2040.clk_sys)
 
     def _start(self, repeated: bool) -> None:
         self._after(1, self._i2c.complete_start)

@@ -19,6 +19,8 @@ from rp2040py.usb.cdc import USBCDC
 from rp2040py.utils.logging import ConsoleLogger, LogLevel
 
 CLOCK_HZ = 125_000_000
+BOOT_S = 5.0
+"""Emulated seconds within which a program must have appeared on USB; it takes a fifth of one."""
 _BEYOND = 8 << 20  # where the emulator has flash and a Pico has none
 _PACKET = 64  # bytes of one USB packet
 _VECTORED = 0xB007C0D3  # in SCRATCH4: start at the address in SCRATCH7, as only the ROM's `reset_to_usb_boot` asks

@@ -7,16 +7,15 @@ and here that is when the counter of 4096 wraps, for every output.
 from collections.abc import Callable
 from typing import Any
 
-from bubbleskin.sim.rp2040.bus import I2cChip
+from bubbleskin.sim.rp2040.bus import NANOS, I2cChip
 
 _MODE1, _MODE2, _LED0, _ALL_LED, _PRE_SCALE = 0x00, 0x01, 0x06, 0xFA, 0xFE
 _EXTCLK, _INCREMENT, _SLEEP, _ALL_CALL = 0x40, 0x20, 0x10, 0x01
 _ALL_CALL_ADDRESS = 0x70
 _OUTPUTS = 16
-_COUNTS = 4096
+_PERIOD_COUNTS = 4096
 _FULL = 0x1000  # of ON: always on; of OFF: always off, which wins
 _INTERNAL_HZ = 25e6
-_NANOS = 1e9
 
 
 class Pca9685(I2cChip):
@@ -130,7 +129,7 @@ class Pca9685(I2cChip):
     @property
     def period(self) -> float:
         """Seconds of one period; infinite while it is not clocked."""
-        return _COUNTS / self._rate / _NANOS if self._rate else float("inf")
+        return _PERIOD_COUNTS / self._rate / NANOS if self._rate else float("inf")
 
     def clock_changed(self) -> None:
         """The clock at EXTCLK has changed, stopped or begun."""
@@ -150,7 +149,7 @@ class Pca9685(I2cChip):
     def _run(self) -> None:
         mode1 = self._registers[_MODE1]
         hz = self._external_hz() if mode1 & _EXTCLK else _INTERNAL_HZ
-        self._rate = 0.0 if mode1 & _SLEEP else hz / (self._registers[_PRE_SCALE] + 1) / _NANOS
+        self._rate = 0.0 if mode1 & _SLEEP else hz / (self._registers[_PRE_SCALE] + 1) / NANOS
         self._alarm.cancel()
         if self._rate:
             self._next = next(i for i, count in enumerate(self._events) if count > self._count)
@@ -162,8 +161,8 @@ class Pca9685(I2cChip):
 
     def _event(self) -> None:
         count = self._events[self._next]
-        if count == _COUNTS:
-            self._since += (_COUNTS - self._count) / self._rate
+        if count == _PERIOD_COUNTS:
+            self._since += (_PERIOD_COUNTS - self._count) / self._rate
             self._count = 0.0
             self._latch()
         else:
@@ -180,8 +179,8 @@ class Pca9685(I2cChip):
             )
             for at in range(_LED0, _LED0 + 4 * _OUTPUTS, 4)
         ]
-        edges = {count for pair in self._latched for count in pair if 0 < count < _COUNTS}
-        self._events = [*sorted(edges), _COUNTS]
+        edges = {count for pair in self._latched for count in pair if 0 < count < _PERIOD_COUNTS}
+        self._events = [*sorted(edges), _PERIOD_COUNTS]
         self._next = 0
         self._look(0)
 
@@ -206,4 +205,4 @@ def _window(on: int, off: int) -> tuple[float, float]:
         return 0.0, 0.0
     if on & _FULL:
         return 0.0, 1.0
-    return on / _COUNTS, (off if off > on else _COUNTS) / _COUNTS
+    return on / _PERIOD_COUNTS, (off if off > on else _PERIOD_COUNTS) / _PERIOD_COUNTS

@@ -3,11 +3,10 @@
 from collections.abc import Callable
 
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.sim.rp2040.chip import Chip
+from bubbleskin.sim.rp2040.chip import BOOT_S, Chip
 
 _RAW, _END = b"\x01", b"\x04"
 _STEP = 1e-3
-_BOOT_S = 5.0
 
 
 class Prompt:
@@ -15,12 +14,12 @@ class Prompt:
 
     def __init__(self, chip: Chip):
         self.chip = chip
-        self._until(lambda: chip.connected, _BOOT_S, "appeared on USB")
+        self._until(lambda: chip.connected, BOOT_S, "appeared on USB")
         chip.write(b"\r\n")  # what it has said before it was connected waits until it is spoken to
-        self._until(lambda: b">>> " in chip.from_device, _BOOT_S, "shown a prompt")
+        self._until(lambda: b">>> " in chip.from_device, BOOT_S, "shown a prompt")
         chip.from_device.clear()
         chip.write(_RAW)
-        self._until(lambda: chip.from_device.endswith(b"CTRL-B to exit\r\n>"), _BOOT_S, "shown its raw prompt")
+        self._until(lambda: chip.from_device.endswith(b"CTRL-B to exit\r\n>"), BOOT_S, "shown its raw prompt")
 
     def run(self, script: str, seconds: float = 10.0) -> str:
         """What `script` prints within so many emulated seconds; names live on. `BubbleskinError` where it fails."""

@@ -1,4 +1,4 @@
-"""Telemetry that has come: kept for whoever reads it, counted, and handed to those who listen."""
+"""Telemetry that has come: it waits for whoever reads it, is counted, and is handed to those who listen."""
 
 from collections import deque
 from collections.abc import Callable
@@ -9,10 +9,11 @@ from bubbleskin.link.message import Message
 UNASKED = (messages.TELEMETRY, messages.TELEMETRY_FIELDS)
 """Messages that answer no request."""
 
-_KEPT = 4096
+_LENGTH = 4096
+"""Messages that wait at most: of more, the oldest are dropped."""
 
 
-class Inbox(deque[Message]):
+class TelemetryQueue(deque[Message]):
     """The newest telemetry, oldest first. `listeners` are called with each message and `lost` as it comes.
 
     `lost` counts the messages that were due since `begin` and have not come: gaps in the sequence numbers, whether
@@ -20,7 +21,7 @@ class Inbox(deque[Message]):
     """
 
     def __init__(self) -> None:
-        super().__init__(maxlen=_KEPT)
+        super().__init__(maxlen=_LENGTH)
         self.listeners: list[Callable[[Message, int], None]] = []
         self.lost = 0
         self._sequence = 0

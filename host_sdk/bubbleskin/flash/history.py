@@ -1,11 +1,12 @@
-"""UF2s that have been seen to work, kept on this computer so that there is a way back."""
+"""UF2s that have been seen to work: a history on this computer, so that there is a way back."""
 
 import hashlib
 from pathlib import Path
 
 from bubbleskin.toolchain.interpreter import cache_folder
 
-_KEPT = 2
+_LENGTH = 2
+"""UF2s of a board that are held."""
 
 
 class UnderWay:
@@ -28,7 +29,7 @@ class UnderWay:
         self._note.unlink(missing_ok=True)
 
 
-class Kept:
+class History:
     """The last UF2s of one kind of board that answered HELLO after they had been copied, the newest first."""
 
     def __init__(self, board: str, folder: Path | None = None):
@@ -38,7 +39,7 @@ class Kept:
         """This one has answered."""
         self._folder.mkdir(parents=True, exist_ok=True)
         each = [data, *(old for old in self._all() if old != data)]
-        for number, content in reversed(list(enumerate(each[:_KEPT]))):  # the oldest first: none is ever missing
+        for number, content in reversed(list(enumerate(each[:_LENGTH]))):  # the oldest first: none is ever missing
             new = self._folder / "new"
             new.write_bytes(content)
             new.replace(self._folder / f"{number}.uf2")
@@ -52,14 +53,14 @@ class Kept:
         """The newest that worked and is not what was copied last; None where there is none."""
         mark = self._folder / "tried"
         tried = mark.read_text() if mark.is_file() else ""
-        for number in range(_KEPT):
+        for number in range(_LENGTH):
             path = self._folder / f"{number}.uf2"
             if path.is_file() and _digest(path.read_bytes()) != tried:
                 return path
         return None
 
     def _all(self) -> list[bytes]:
-        paths = (self._folder / f"{number}.uf2" for number in range(_KEPT))
+        paths = (self._folder / f"{number}.uf2" for number in range(_LENGTH))
         return [path.read_bytes() for path in paths if path.is_file()]
 
 

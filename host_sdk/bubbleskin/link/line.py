@@ -1,0 +1,114 @@
+"""A transport as the link uses it: read with and without an event loop, lost and found again."""
+
+import asyncio
+import contextlib
+import logging
+import time
+import weakref
+from collections.abc import Callable
+
+from bubbleskin.errors import LinkError
+from bubbleskin.link.transport import Transport
+
+_log = logging.getLogger(__name__)
+
+SLICE = 0.02
+"""Seconds for which one task reads before another has its turn; and between two attempts to open a lost port."""
+
+
+class Line:
+    """Bytes to and from `transport`; the method `take(data)` is called with all that comes.
+
+    Without an event loop the transport is read in place and nothing here suspends. With one, other tasks have their
+    turn while this one waits: a transport that waits by the wall clock is read in a thread.
+    """
+
+    def __init__(self, transport: Transport, take: Callable[[bytes], None], *, event_loop: bool):
+        self.transport = transport
+        self.lost: LinkError | None = None
+        """Why the port has gone; None while it is there."""
+        self.keep = False
+        """Whether a port that goes is waited for; otherwise its error is raised."""
+        self._taker = weakref.WeakMethod(
+            take
+        )  # no circle: a link that nobody holds is gone at once, and its port with it
+        self._event_loop = event_loop
+        self._reading = asyncio.Lock()
+        self._thread: asyncio.Future[None] | None = None
+
+    def write(self, data: bytes) -> None:
+        """Send `data`; nothing while the port has gone."""
+        if self.lost:
+            return
+        try:
+            self.transport.write(data)
+        except LinkError as problem:
+            self._lose(problem)
+
+    def reopen(self) -> bool:
+        """Try to open a port that has gone; whether it is back."""
+        try:
+            self.transport.reopen()
+        except LinkError:
+            return False
+        self.lost = None
+        _log.info("%s is back", self.transport.name)
+        return True
+
+    async def receive(self, timeout: Callable[[], float], done: Callable[[], bool]) -> None:
+        """Take what comes within `timeout()` seconds, with an event loop within a slice of them; not if `done()`.
+
+        Both are asked once it is this task's turn to read.
+        """
+        async with self._reading:
+            if done():
+                return
+            seconds = max(timeout(), 0.0)
+            try:
+                if self.lost:
+                    await self._pause(min(seconds, SLICE))
+                elif not self._event_loop:
+                    self._take(self.transport.read(seconds))
+                elif not self.transport.blocks:
+                    self._take(self.transport.read(min(seconds, SLICE)))
+                    await asyncio.sleep(0)
+                else:
+                    await self._receive_beside(min(seconds, SLICE))
+            except LinkError as problem:
+                self._lose(problem)
+
+    async def settle(self) -> None:
+        """Wait for a thread that still reads: a port must not close under its reader."""
+        if self._thread:
+            with contextlib.suppress(LinkError):
+                await asyncio.shield(self._thread)
+
+    def _lose(self, problem: LinkError) -> None:
+        if not (self.keep and self.transport.reopens):
+            raise problem
+        self.lost = problem
+        _log.info("%s is lost and waited for: %s", self.transport.name, problem)
+
+    def _take(self, data: bytes) -> None:
+        if take := self._taker():
+            take(data)
+
+    async def _pause(self, seconds: float) -> None:
+        if self._event_loop:
+            await asyncio.sleep(seconds)
+        else:
+            time.sleep(seconds)
+
+    async def _receive_beside(self, timeout: float) -> None:
+        # A cancelled wait must not lose what the thread is about to read: it goes on, and takes it.
+        if self._thread is None:
+            self._thread = asyncio.ensure_future(self._receive_in_thread(timeout))
+        thread = self._thread
+        try:
+            await asyncio.shield(thread)
+        finally:
+            if thread.done():
+                self._thread = None
+
+    async def _receive_in_thread(self, timeout: float) -> None:
+        self._take(await asyncio.to_thread(self.transport.read, timeout))
