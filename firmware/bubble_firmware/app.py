@@ -13,6 +13,7 @@ from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.table import Tables
 from bubble_firmware.control.trim import Trim
 from bubble_firmware.handlers.faults import FaultHandlers
+from bubble_firmware.handlers.layout import LayoutHandlers
 from bubble_firmware.handlers.sequence import SequenceHandlers
 from bubble_firmware.handlers.session import SessionHandlers
 from bubble_firmware.handlers.settings import SettingHandlers
@@ -37,8 +38,7 @@ if TYPE_CHECKING:
 # [constants] bubble_protocol.schema.faults: OVERFILLED SELF_TEST
 # [constants] bubble_protocol.schema.modes: BOOT IDLE
 # [constants] bubble_firmware.safety.state: NO_EVENT TESTED as EVENT_TESTED
-# [constants] bubble_firmware.safety.fault_monitor: NEW_FAULT MOVING_BUBBLE
-# [constants] bubble_firmware.safety.fault_monitor: PRESSED_BUBBLE OVERFILLED_BUBBLE
+# [constants] bubble_firmware.safety.watch_layout: NEW_FAULT MOVING_BUBBLE PRESSED_BUBBLE OVERFILLED_BUBBLE
 _OVERFILLED = const(128)
 _SELF_TEST = const(64)
 _BOOT = const(3)
@@ -88,6 +88,7 @@ class App:
             TableHandlers(reply, board, self.tables, self.bubbles),
             TrimHandlers(reply, board, self.safety, self.trim),
             StoreHandlers(reply, hal, state, self.store),
+            LayoutHandlers(reply, board, self.clock),
             SettingHandlers(reply, self.clock, self.settings),
             FaultHandlers(reply, state, self.commands),
             SystemHandlers(self.server, hal, state, self.stats, self.tables, self.store, self.commands),

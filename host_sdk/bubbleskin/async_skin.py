@@ -12,6 +12,7 @@ from bubbleskin.device import tables as device_tables
 from bubbleskin.device.faults import Fault, read_log
 from bubbleskin.device.health import Health, TickHistogram
 from bubbleskin.device.info import Info
+from bubbleskin.device.layout import find_layout
 from bubbleskin.device.settings import Setting, changes, settings_of
 from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
@@ -72,12 +73,13 @@ class AsyncSkin:
         *,
         event_loop: bool = False,
         simulated: "Simulated | None" = None,
+        layout: Layout | None = None,
     ) -> Self:
-        """Greet the device at the other end of `transport`."""
+        """Greet the device at the other end of `transport`; `layout`: instead of the one that it tells."""
         link = Link(transport, timeout, event_loop=event_loop)
         try:
-            info = Info.of(await link.hello())
-            return cls(link, info, Layout.of_board(info.board, info.bubbles), simulated)
+            hello = await link.hello()
+            return cls(link, Info.of(hello), await find_layout(link, hello, layout), simulated)
         except BaseException:
             await link.close()
             raise

@@ -1,10 +1,12 @@
 """From a URL to a wristband: serial ports, sockets, and simulated boards."""
 
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, unquote, urlsplit
 
+from bubbleskin import boards
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.errors import InvalidInput
+from bubbleskin.layout import Layout
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.serial import SerialTransport, only_attached
 from bubbleskin.link.transport import Transport
@@ -17,27 +19,28 @@ SIMULATED = ("sim", "micropython", "rp2040")
 NETWORK = ("socket", "rfc2217")
 
 
-def connect(url: str | None = None, *, timeout: float = 2.0) -> Skin:
+def connect(url: str | None = None, *, timeout: float = 2.0, layout: Layout | None = None) -> Skin:
     """Open a wristband.
 
     `url`: a serial port (`/dev/ttyACM0`, `COM3`), `socket://host:port`, `rfc2217://host:port`, or a simulated
-    board: `sim://wristband7`, `micropython://wristband7`, `rp2040://wristband7`, with options such as
-    `?seed=3&spread=0.1&realtime=1`.
+    board, `sim://BOARD`, `micropython://BOARD` or `rp2040://BOARD`, with options such as `?seed=3&spread=0.1&realtime=1`.
+    BOARD is the name of a board, or the path of a board's file such as `sim://boards/pad8.py`.
     None is the only wristband attached. `timeout`: seconds within which the device must answer each request.
+    `layout`: where its bubbles are, instead of what the device tells; for firmware that does not.
 
     Raises `InvalidInput` for a URL that cannot be meant, `LinkError` where nothing can be opened and
     `WrongDevice` where what is there is no wristband.
     """
     patience = _checked(timeout)
     transport, board = open_transport(url)
-    return Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board)))
+    return Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout)))
 
 
-async def aconnect(url: str | None = None, *, timeout: float = 2.0) -> AsyncSkin:
+async def aconnect(url: str | None = None, *, timeout: float = 2.0, layout: Layout | None = None) -> AsyncSkin:
     """The same for asyncio: a skin whose methods are coroutines."""
     patience = _checked(timeout)
     transport, board = open_transport(url)
-    return await AsyncSkin.open(transport, patience, event_loop=True, simulated=board)
+    return await AsyncSkin.open(transport, patience, event_loop=True, simulated=board, layout=layout)
 
 
 def open_transport(url: str | None) -> "tuple[Transport, Simulated | None]":
@@ -45,24 +48,34 @@ def open_transport(url: str | None) -> "tuple[Transport, Simulated | None]":
     if url is None:
         return SerialTransport(only_attached()), None
     if not url.strip():
-        raise InvalidInput("The device's name is empty; give a port or a URL, such as sim://wristband7.")
+        raise InvalidInput(f"The device's name is empty; give a port or a URL, such as sim://{boards.DEFAULT}.")
+    scheme, separator, rest = url.partition("://")
+    if scheme.lower() in SIMULATED and separator:
+        return _open_simulated(scheme.lower(), rest)
     try:
         parts = urlsplit(url)
         port = parts.port
     except ValueError as error:
         raise InvalidInput(f"{url} is not a port or URL that can be opened: {error}.") from None
+    if parts.scheme in SIMULATED:
+        raise InvalidInput(f"{url} is not a simulated board; write {parts.scheme}://{boards.DEFAULT}.")
     if parts.scheme in NETWORK and not (parts.hostname and port):
         raise InvalidInput(f"{url} does not name host and port; write {parts.scheme}://host:7707.")
-    if parts.scheme in SIMULATED:
-        if parts.path or parts.fragment:
-            raise InvalidInput(
-                f"{url} is not a simulated board; write {parts.scheme}://wristband7, "
-                f"with options after a question mark, such as {parts.scheme}://wristband7?seed=3."
-            )
-        from bubbleskin.sim import open_board
-
-        return open_board(parts.scheme, parts.netloc, dict(parse_qsl(parts.query, keep_blank_values=True)))
     return SerialTransport(url), None
+
+
+def _open_simulated(scheme: str, rest: str) -> "tuple[Transport, Simulated]":
+    """The board of `scheme://rest`: its name or the path of its file, and options after a question mark."""
+    from bubbleskin.sim import open_board
+
+    quoted, _, options = rest.partition("?")
+    board = unquote(quoted)
+    if "/" in board and not boards.is_file(board):
+        raise InvalidInput(
+            f"{scheme}://{rest} is not a simulated board; write {scheme}://{boards.DEFAULT}, or the path of a board's file, "
+            f"with options after a question mark, such as {scheme}://{boards.DEFAULT}?seed=3."
+        )
+    return open_board(scheme, board, dict(parse_qsl(options, keep_blank_values=True)))
 
 
 def _checked(timeout: float) -> float:

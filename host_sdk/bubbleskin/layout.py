@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from bubbleskin.errors import InvalidInput, WrongDevice
+from bubbleskin import boards
+from bubbleskin.errors import InvalidInput
 
-_NEIGHBOUR = 1.25  # bubbles nearer than this many pitches touch when they grow
+_SAME_MM = 1e-3  # in which devices tell where their bubbles are
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,12 @@ class Layout:
         return f"<Layout of {len(self)} bubbles, {self.pitch_mm:g} mm apart>"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Layout) and np.array_equal(self.positions_mm, other.positions_mm)
+        """Whether the same bubbles are at the same places, to the µm in which devices tell them."""
+        return (
+            isinstance(other, Layout)
+            and len(self) == len(other)
+            and np.allclose(self.positions_mm, other.positions_mm, rtol=0, atol=_SAME_MM)
+        )
 
     @classmethod
     def hexagon(cls, rings: int = 1, pitch_mm: float = 10.0) -> Self:
@@ -84,22 +90,24 @@ class Layout:
             ) from None
 
     @classmethod
-    def of_board(cls, board: str, bubbles: int) -> Self:
-        """The layout of a board that we know by name; otherwise one row of `bubbles`."""
-        rings = {"wristband7": 1, "wristband19": 2}.get(board)
-        layout = cls.hexagon(rings) if rings is not None else cls.grid(1, max(bubbles, 1))
-        if len(layout) != bubbles:
-            raise WrongDevice(
-                f"The device calls itself {board}, which has {len(layout)} bubbles, but reports {bubbles}. "
-                "Check that the firmware on it was made for this board."
-            )
-        return layout
+    def from_um(cls, positions_um: ArrayLike, pitch_um: float) -> Self:
+        """From whole µm, as boards' files have and devices tell them."""
+        return cls(np.asarray(positions_um, dtype=float).reshape(-1, 2) / 1000, pitch_um / 1000)
+
+    @classmethod
+    def of_board(cls, board: str | Path) -> Self:
+        """The layout in the file of a board, one of the SDK's by its name or any other by the path of its file.
+
+        Raises `InvalidInput` where there is no such board.
+        """
+        data = boards.load(board)
+        return cls.from_um(data.LAYOUT, data.PITCH_UM)
 
     @cached_property
     def neighbours(self) -> tuple[tuple[int, ...], ...]:
         """For each bubble the bubbles around it, in order of index."""
         gap = np.linalg.norm(self.positions_mm[:, None] - self.positions_mm[None], axis=2)
-        near = (gap > 0) & (gap < _NEIGHBOUR * self.pitch_mm)
+        near = (gap > 0) & (gap < boards.NEIGHBOUR * self.pitch_mm)
         return tuple(tuple(np.flatnonzero(row).tolist()) for row in near)
 
     def names(self, bubbles: Sequence[int]) -> str:

@@ -13,7 +13,7 @@ from bubbleskin.sim.rp2040.board import Rp2040Board
 from bubbleskin.sim.rp2040.prompt import Prompt
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import Skin
-from bubbleskin.toolchain.rp2040 import BARE
+from bubbleskin.toolchain.frozen import BARE
 
 pytestmark = pytest.mark.chip
 

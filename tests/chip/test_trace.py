@@ -16,7 +16,7 @@ from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import Skin
-from bubbleskin.toolchain.rp2040 import BARE
+from bubbleskin.toolchain.frozen import BARE
 
 pytestmark = pytest.mark.chip
 

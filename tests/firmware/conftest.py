@@ -16,6 +16,7 @@ from bubble_protocol.schema.messages import HELLO, PING
 from bubble_protocol.schema.sequences import SEQUENCE_ENDED, STEP_BEGUN
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.link import message as wire
+from bubbleskin.link.reader import Reader
 
 SESSION = 0x89ABCDEF
 
@@ -78,7 +79,7 @@ class Rig:
         self.board = boards.load(name)
         self.hal = ScriptedHal(self.board)
         self.app = App(self.board, self.hal)
-        self._reader = wire.Reader()
+        self._reader = Reader()
         self._sequence = 0
         self.open(SESSION)
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from bubble_firmware import boards
-from bubble_firmware.control import curve, flow, table
+from bubble_firmware.control import curve, dose, estimate, flow, table, trajectory
 from bubble_firmware.control import state_layout as layout
-from bubble_firmware.control import step as control
 from bubble_firmware.control.bubbles import Bubbles
 from bubble_protocol import codec
 from bubbleskin import Table, YeohBalloon, build_table
@@ -177,10 +176,10 @@ class Words:
 
 @pytest.fixture
 def checked(monkeypatch):
-    """`control` computes in words that notice when they overflow."""
-    ptr16, ptr32 = control.ptr16, control.ptr32
-    monkeypatch.setattr(control, "ptr16", lambda buffer: Words(ptr16(buffer)))
-    monkeypatch.setattr(control, "ptr32", lambda buffer: Words(ptr32(buffer)))
+    """The passes of control compute in words that notice when they overflow."""
+    for module in (estimate, trajectory, dose):
+        ptr32 = module.ptr32
+        monkeypatch.setattr(module, "ptr32", lambda buffer, ptr32=ptr32: Words(ptr32(buffer)))
 
 
 def extreme_tables(chance):
@@ -211,7 +210,7 @@ def test_nothing_overflows_32_bits(rig7, seed):
         tables.swap()
         rig7.app.bubbles.use_tables()
         for _ in range(4):
-            rig7.app.commands.show(
+            rig7.app.show(
                 array("i", [chance.choice([0, 14000, chance.randrange(14001)]) for _ in range(7)]),
                 0,
                 chance.choice([0, 60000]),
@@ -220,4 +219,5 @@ def test_nothing_overflows_32_bits(rig7, seed):
                 rig7.app.bubbles.clear_faults(bubble)
             for _ in range(12):
                 rig7.hal.counts = [chance.choice([9, 160, 1500, 2600, 4086, chance.randrange(4096)]) for _ in range(8)]
-                rig7.app._control()  # not `tick`, which would catch what we look for
+                rig7.app.tick()
+                assert rig7.app.stats.exceptions == 0, "a word was beyond 32 bits"

@@ -21,7 +21,8 @@ import pytest
 from bubble_firmware import boards
 from bubble_firmware.control.nominal import KNOTS
 from bubble_protocol.schema import faults, messages, modes, statuses
-from bubbleskin.link.message import Reader, encode, session_key
+from bubbleskin.link.message import encode, session_key
+from bubbleskin.link.reader import Reader
 from bubbleskin.sim.board import InProcessFirmware
 from bubbleskin.sim.micropython import MicroPythonFirmware
 

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from bubble_firmware.device_clock import LATEST, DeviceClock
 from bubble_firmware.safety import state as safety
 from bubble_firmware.safety.fault_log import FaultLog
-from bubble_firmware.safety.fault_monitor import BUDGET
 from bubble_protocol.schema import errors, modes, system
-from bubble_protocol.schema.faults import BOARD, ESTOP, HOST_SILENT, OVERFILLED, VALVE_CHIP, VENTING
+from bubble_protocol.schema.faults import BOARD, BUDGET, ESTOP, HOST_SILENT, OVERFILLED, VALVE_CHIP, VENTING
 from bubble_protocol.schema.modes import ACTIVE, BOOT, FAULTED, HOLDING, IDLE, STOPPED
 from bubble_protocol.schema.modes import VENTING as MODE_VENTING
 from bubble_protocol.schema.settings import BUDGET_KPA_S, DEADMAN_HOLD

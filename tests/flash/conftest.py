@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import crcmod
 import pytest
 
+from bubbleskin import boards
 from bubbleskin.errors import LinkError
 from bubbleskin.flash import uf2
-from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.rp2040 import boot_rom
 from bubbleskin.sim.transport import SimulatedTransport
@@ -76,7 +77,7 @@ class Computer:
         for data, name in self.programs.items():
             if self.flash.startswith(data):
                 self.boots += 1
-                self.board = SimulatedBoard(name, firmware=Firmware(load_board(name), self.boots))
+                self.board = SimulatedBoard(name, firmware=Firmware(boards.load(name), self.boots))
         return self
 
     def pull_out(self) -> None:

@@ -7,7 +7,7 @@ import pytest
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.flash import Order, flash, uf2
 from bubbleskin.flash.prompt import Prompt
-from bubbleskin.toolchain import rp2040
+from bubbleskin.toolchain import frozen, rp2040
 
 pytest.importorskip("rp2040py")
 from bubbleskin.flash.emulated import PORT, EmulatedMachine
@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.chip, pytest.mark.slow, pytest.mark.long]
 def built():
     """The UF2s: a stock MicroPython's and ours."""
     try:
-        return rp2040.firmware([rp2040.STOCK, "wristband7"])
+        return rp2040.firmware([frozen.STOCK, "wristband7"])
     except BubbleskinError as problem:
         if os.environ.get("CI"):
             pytest.fail(str(problem))
@@ -34,7 +34,7 @@ def wait_for_port(machine) -> None:
 
 
 def test_files_onto_a_stock_micropython_then_once_more(built, tmp_path):
-    machine = EmulatedMachine("wristband7", uf2.read(built[rp2040.STOCK]).data, tmp_path / "drive")
+    machine = EmulatedMachine("wristband7", uf2.read(built[frozen.STOCK]).data, tmp_path / "drive")
     machine.plug_in()
     wait_for_port(machine)
     Prompt(machine.open(PORT)).write("/store-a", b"calibration")
@@ -51,7 +51,7 @@ def test_files_onto_a_stock_micropython_then_once_more(built, tmp_path):
     outcome = flash(machine, Order(), history=tmp_path / "history")  # through the prompt into the boot loader
     assert (outcome.how, outcome.old) == ("uf2", outcome.info.firmware)
     machine.pull_out()
-    rom_only = EmulatedMachine("wristband7", uf2.read(built[rp2040.STOCK]).data, tmp_path / "drive")
+    rom_only = EmulatedMachine("wristband7", uf2.read(built[frozen.STOCK]).data, tmp_path / "drive")
     at = uf2.FILES_AT - uf2.FLASH_AT
     rom_only.flash[at:] = machine.flash[at:]
     rom_only.plug_in()

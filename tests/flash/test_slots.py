@@ -13,7 +13,7 @@ import pytest
 from bubbleskin.errors import BubbleskinError, LinkError
 from bubbleskin.flash import slots, starter, uf2
 from bubbleskin.flash.prompt import Prompt
-from bubbleskin.toolchain import rp2040
+from bubbleskin.toolchain import frozen, rp2040
 
 pytest.importorskip("rp2040py")
 from bubbleskin.flash.emulated import PORT, EmulatedMachine
@@ -40,7 +40,7 @@ def firmware(who: str, folder, start: str = "import bubble_firmware; raise Syste
 def stock():
     """Flash with a stock MicroPython and no files."""
     try:
-        return uf2.read(rp2040.firmware([rp2040.STOCK])[rp2040.STOCK]).data
+        return uf2.read(rp2040.firmware([frozen.STOCK])[frozen.STOCK]).data
     except BubbleskinError as problem:
         if os.environ.get("CI"):
             pytest.fail(str(problem))

@@ -20,9 +20,9 @@ from bubble_protocol.schema import (
     telemetry,
 )
 from bubble_protocol.schema.messages import I16, I32, MESSAGES, REPLY, TEXT, U8, U16, U32
+from bubbleskin.boards import NAMES
 from bubbleskin.link.message import Message
 from bubbleskin.link.refusals import describe_refusal
-from bubbleskin.sim.board import BOARDS
 
 RANGES = {
     U8: (0, 0xFF),
@@ -102,13 +102,14 @@ def test_names_of_fields_are_unique_in_a_message():
         ("TABLE_READ_REPLY", 48),
         ("TRIM_WRITE", BUBBLES),
         ("TRIM_READ_REPLY", BUBBLES),
+        ("LAYOUT_REPLY", BUBBLES),
         ("SEQUENCE_WRITE", steps.HEAD + BUBBLES),
     ],
 )
 def test_a_frame_has_room_for_every_bubble(name, entries):
     message = codec.BY_NAME[name]
     assert message.fixed_size + entries * message.stride <= PAYLOAD_MAX
-    assert max(boards.load(board).BUBBLES for board in BOARDS) <= BUBBLES
+    assert max(boards.load(board).BUBBLES for board in NAMES) <= BUBBLES
     assert KNOTS_PER_MESSAGE == 48
 
 

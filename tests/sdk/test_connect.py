@@ -59,7 +59,7 @@ def connecting(url):
         ("socket://127.0.0.1", ["does not name host and port", "socket://host:7707"]),
         ("socket://127.0.0.1:99999", ["not a port or URL"]),
         ("rfc2217://:7707", ["does not name host and port"]),
-        ("sim://[", ["sim://[", "not a port or URL"]),
+        ("socket://[", ["socket://[", "not a port or URL"]),
         ("sim://", ["wristband7 and wristband19"]),
         ("sim://wristband8", ["'wristband8'", "wristband7 and wristband19"]),
         ("micropython://wristband8", ["'wristband8'", "wristband7 and wristband19"]),

@@ -133,16 +133,14 @@ def test_what_cannot_be_meant_is_refused(make):
         make()
 
 
-def test_known_boards_have_their_layouts_and_others_a_row():
-    assert bs.Layout.of_board("wristband7", 7) == bs.Layout.hexagon(1)
-    assert bs.Layout.of_board("wristband19", 19) == bs.Layout.hexagon(2)
-    assert bs.Layout.of_board("bench rig", 3) == bs.Layout.grid(1, 3)
+def test_a_board_is_not_guessed():
+    with pytest.raises(bs.InvalidInput, match="There is no board 'bench rig'"):
+        bs.Layout.of_board("bench rig")
 
 
-@pytest.mark.parametrize(("board", "bubbles"), [("wristband7", 6), ("wristband19", 7), ("bench rig", 0)])
-def test_a_board_with_other_bubbles_than_its_name_says_is_a_wrong_device(board, bubbles):
-    with pytest.raises(bs.WrongDevice, match=f"calls itself {board}, .* reports {bubbles}"):
-        bs.Layout.of_board(board, bubbles)
+def test_layouts_are_equal_to_the_micrometre():
+    assert bs.Layout.hexagon(2) == bs.Layout.from_um(np.rint(1000 * bs.Layout.hexagon(2).positions_mm), 10000)
+    assert bs.Layout.from_um([(0, 0), (10000, 0)], 10000) != bs.Layout.from_um([(0, 0), (10002, 0)], 10000)
 
 
 def test_bubbles_are_named_in_words():

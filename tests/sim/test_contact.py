@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
+from bubbleskin import boards
 from bubbleskin.sim.board import make_plant
 
 FLAT = 5.0
@@ -41,7 +42,7 @@ def test_the_plant_rests_where_the_model_does(order):
 
 
 def test_a_bubble_that_nobody_touches_is_as_if_it_were_alone():
-    together, alone = (make_plant("wristband7", 7, 1, 0.0, contact) for contact in (True, False))
+    together, alone = (make_plant(boards.load("wristband7"), 1, 0.0, contact) for contact in (True, False))
     for plant in (together, alone):
         for on in [5e-3] * 30 + [0.0] * 100:
             plant.advance(5e-3, [on] + [0.0] * 6, [0.0] + [5e-3] * 6, pump=0.5)
@@ -50,7 +51,7 @@ def test_a_bubble_that_nobody_touches_is_as_if_it_were_alone():
 
 
 def test_a_squeezed_plant_comes_back_when_its_neighbours_have_gone():
-    plant = make_plant("wristband7", 7, 2, 0.0, True)
+    plant = make_plant(boards.load("wristband7"), 2, 0.0, True)
     plant.rest_at([TALL] * 7)
     for vent in ([0.0] * 7, [0.0] + [5e-3] * 6):
         for _ in range(300):
@@ -60,7 +61,7 @@ def test_a_squeezed_plant_comes_back_when_its_neighbours_have_gone():
 
 
 def test_snapshots_hold_the_places_too():
-    plant = make_plant("wristband7", 7, 2, 0.0, True)
+    plant = make_plant(boards.load("wristband7"), 2, 0.0, True)
     plant.rest_at([TALL] * 7)
     snapshot = plant.snapshot()
 

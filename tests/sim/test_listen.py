@@ -5,9 +5,10 @@ import pytest
 from bubble_protocol import frame
 from bubble_protocol.schema import messages
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
+from bubbleskin import boards
 from bubbleskin.link.message import encode, session_key
 from bubbleskin.link.reader import Reader
-from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.micropython import MicroPythonFirmware
 
 SESSION = 5
@@ -15,7 +16,7 @@ SESSION = 5
 
 @pytest.fixture(params=["cpython", "micropython"])
 def host(request):
-    firmware = MicroPythonFirmware(load_board("wristband7"), boot_id=1) if request.param == "micropython" else None
+    firmware = MicroPythonFirmware(boards.load("wristband7"), boot_id=1) if request.param == "micropython" else None
     board = SimulatedBoard("wristband7", firmware=firmware)
     yield Host(board)
     board.close()

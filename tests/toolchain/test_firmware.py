@@ -5,40 +5,41 @@ import shutil
 
 import pytest
 
+from bubbleskin import boards
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.toolchain import rp2040
+from bubbleskin.toolchain import frozen, rp2040
 
 FILES = {"firmware/manifest.py": b"1", "firmware/bubble_firmware/main.py": b"2"}
 
 
-def test_the_key_follows_board_compiler_and_every_byte_that_is_frozen():
+def test_the_key_follows_board_and_compiler_and_every_byte_that_is_frozen():
     keys = {
-        rp2040.key("wristband7", "12.2.1", FILES),
-        rp2040.key("wristband19", "12.2.1", FILES),
-        rp2040.key("wristband7", "13.2.1", FILES),
-        rp2040.key("wristband7", "12.2.1", {**FILES, "firmware/manifest.py": b"3"}),
-        rp2040.key("wristband7", "12.2.1", {**FILES, "x.py": b""}),
+        frozen.key("12.2.1", FILES),
+        frozen.key("13.2.1", FILES),
+        frozen.key("12.2.1", {**FILES, "firmware/manifest.py": b"3"}),
+        frozen.key("12.2.1", {**FILES, "x.py": b""}),
+        *(frozen.key("12.2.1", frozen.staged_files(board)) for board in (*boards.NAMES, frozen.BARE, frozen.STOCK)),
     }
-    assert len(keys) == 5
-    assert rp2040.key("wristband7", "12.2.1", dict(reversed(FILES.items()))) in keys
+    assert len(keys) == 6 + len(boards.NAMES)
+    assert frozen.key("12.2.1", dict(reversed(FILES.items()))) in keys
 
 
 def test_both_packages_and_the_manifest_are_frozen():
-    files = rp2040.device_files()
+    files = frozen.staged_files("wristband7")
     assert {"manifest.py", "firmware/manifest.py", "firmware/bubble_firmware/main.py"} <= set(files)
     assert "protocol/bubble_protocol/codec.py" in files
     assert not any("__pycache__" in name or name.startswith("/") for name in files)
 
 
 def test_staging_touches_only_what_has_changed(tmp_path):
-    rp2040.stage(tmp_path, "wristband7", {**FILES, "firmware/bubble_firmware/old.py": b"4"})
-    main = tmp_path / "staging/firmware/bubble_firmware/main.py"
+    frozen.stage(tmp_path, {**FILES, "firmware/bubble_firmware/old.py": b"4"})
+    main = tmp_path / "firmware/bubble_firmware/main.py"
     os.utime(main, (1, 1))
-    manifest = rp2040.stage(tmp_path, "wristband19", FILES)
-    assert manifest == tmp_path / "staging/manifest.py"
+    manifest = frozen.stage(tmp_path, {**FILES, "start/main.py": b"5"})
+    assert manifest == tmp_path / "manifest.py"
     assert main.stat().st_mtime == 1
     assert not main.with_name("old.py").exists()
-    assert "'wristband19'" in (tmp_path / "staging/start/main.py").read_text()
+    assert (tmp_path / "start/main.py").read_bytes() == b"5"
 
 
 def test_a_checkout_is_looked_at_before_anything_is_built(tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.toolchain import debian, interpreter, steps, unix
+from bubbleskin.toolchain import commands, debian, interpreter, unix
 
 TOOL = Path(__file__).parents[2] / "tools" / "build_micropython.py"
 
@@ -154,7 +154,7 @@ def test_the_tool_says_one_sentence_and_fails(tmp_path):
 
 
 def test_a_failed_step_shows_the_end_of_its_log(tmp_path):
-    run = steps.Steps(tmp_path).run
+    run = commands.CommandRunner(tmp_path).run
     script = "for line in range(30): print('line', line)\nraise SystemExit(3)"
     with pytest.raises(BubbleskinError) as failure:
         run("Counting", [sys.executable, "-c", script])

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bubbleskin import boards
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.link.link import run_sync
-from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.micropython import MicroPythonFirmware
 from bubbleskin.sim.plant import Plant, PlantParameters
 from bubbleskin.sim.transport import SimulatedTransport
@@ -157,7 +158,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--board", default="wristband7")
     asked = parser.parse_args()
-    data = load_board(asked.board)
+    data = boards.load(asked.board)
     board = SimulatedBoard(asked.board, seed=asked.seed, firmware=MicroPythonFirmware(data, boot_id=asked.seed))
     board.plant = Plant(PlantParameters.nominal(data.BUBBLES), seed=asked.seed, substep=SUBSTEP)
     link = Counting(board, asked.board)

@@ -1,4 +1,11 @@
-"""Boards as data: one module a board, all numbers integers. A new board is one new file here."""
+"""Boards as data, all numbers integers: a board is one file of this folder. docs/boards.md says what stands in it.
+
+`parts` has what several boards share. Nothing lists the boards here: a device loads the one it is, and the host finds
+them in the folder, see `bubbleskin.boards`.
+"""
+
+DEFAULT = "wristband7"
+"""The board that is meant where none is named."""
 
 
 def load(name):

@@ -1,13 +1,15 @@
 # mypy: disable-error-code="valid-type,index,operator,arg-type"
 """All bubbles of a board: their state, and what the rest of the firmware asks of them.
 
-The state is one array of integers, laid out in `state_layout`; `step` computes on it in every tick.
+The state is one array of integers, laid out in `state_layout`. Three passes over all bubbles compute on it in every tick:
+`estimate`, `trajectory` and `dose`.
 """
 
 from array import array
 
 from bubble_firmware.control import curve, flow, trajectory
-from bubble_firmware.control.step import step as control_step
+from bubble_firmware.control.dose import dose
+from bubble_firmware.control.estimate import estimate
 from bubble_firmware.control.table import KNOTS_MAX
 from bubble_protocol.mpy_compat import const, micropython, ptr32, uint
 
@@ -53,11 +55,11 @@ _GAIN_D = const(12)
 _DEADBAND_UM = const(13)
 _SETTLED_UM = const(14)
 _REST_UM = const(15)
-_RAMP_DONE = const(18)
-_RAMP_TICKS = const(19)
-_RAMP_SHARE = const(20)
-_ROOTS = const(23)
-_ROWS = const(153)
+_RAMP_DONE = const(17)
+_RAMP_TICKS = const(18)
+_RAMP_SHARE = const(19)
+_ROOTS = const(20)
+_ROWS = const(150)
 # [end of constants]
 
 _WHOLE_WAY = const(32768)  # in the shares of `advance`
@@ -119,8 +121,12 @@ class Bubbles:
             rows[at + _AIR] = self.curves[rows[at + _FIRST_SEGMENT] // 4 + _KNOT_AIR]
 
         # A default is a local: an attribute costs the chip 2.5 µs. More than 11 locals and values, and a call allocates.
-        def step(counts, supply_pa, control_mode, work=(control_step, rows, state, self.pulses)):
-            work[0](work[1], work[2], counts, work[3], supply_pa, control_mode)
+        work = (self.state, estimate, trajectory.move_setpoints, dose, self.pulses)
+
+        def step(counts, supply_pa, control_mode, rows=self.rows, work=work):
+            work[1](rows, work[0], counts, control_mode)
+            work[2](rows, work[0])
+            work[3](rows, work[0], work[4], supply_pa, control_mode)
 
         self.step = step
 

@@ -12,17 +12,17 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
 KNOTS_MAX = 80  # of a curve: 64 of a table, and 15 where no segment is longer than 1024 µm
 
 _LONGEST = const(1024)  # µm
-_ATMOSPHERE = const(101325)
 _RISE_MIN = const(1)  # µJ/µm
 _SLOPE_MAX = const(1 << 20)  # *256: steeper, and a deadband's air is beyond 32 bits
 
-# [constants] bubble_firmware.control.state_layout: KNOT_HEIGHT KNOT_AIR KNOT_PRESSURE KNOT_SLOPE KNOT_RECIPROCAL KNOT_WORDS
+# [constants] bubble_firmware.control.state_layout: used
 _KNOT_HEIGHT = const(0)
 _KNOT_AIR = const(1)
 _KNOT_PRESSURE = const(2)
 _KNOT_SLOPE = const(3)
 _KNOT_RECIPROCAL = const(4)
 _KNOT_WORDS = const(5)
+_ATMOSPHERE = const(101325)
 # [end of constants]
 
 

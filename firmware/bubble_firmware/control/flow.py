@@ -10,11 +10,10 @@ from array import array
 
 from bubble_protocol.mpy_compat import const
 
-# [constants] bubble_firmware.control.state_layout: ROOT_STEPS
+# [constants] bubble_firmware.control.state_layout: used
 _ROOT_STEPS = const(64)
-# [end of constants]
-
 _ATMOSPHERE = const(101325)
+# [end of constants]
 
 
 def flow_gain(board):

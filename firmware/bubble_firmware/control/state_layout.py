@@ -37,7 +37,7 @@ TARGET = const(23)  # asked, µm
 HEIGHT = const(24)  # the estimate, in 1/16 µm, so that averages do not stall on whole ones
 HEIGHT_SEGMENT = const(25)  # where its segment of the curve begins, bytes
 HEIGHT_SLOPE = const(26)  # air per height in that segment, µJ/µm, *256
-MODEL_PRESSURE = const(27)  # that belonged to the estimate when it was last measured, Pa
+DUE = const(27)  # whether it is measured and decided upon in this tick
 SETPOINT = const(28)  # in 1/16 µm
 SETPOINT_SEGMENT = const(29)
 SETPOINT_SLOPE = const(30)
@@ -78,19 +78,19 @@ GAIN_D = const(12)
 DEADBAND_UM = const(13)
 SETTLED_UM = const(14)
 REST_UM = const(15)
-SUPPLY_PA = const(16)  # measured, gauge
-CONTROL_MODE = const(17)  # of the last tick
-RAMP_DONE = const(18)  # ticks
-RAMP_TICKS = const(19)
-RAMP_SHARE = const(20)  # how much of it is done, *4096
-ROOT_SCALE = const(21)  # supply's absolute pressure, 8 Pa
-ROOT_RECIPROCAL = const(22)  # of the same, (2^30 - 1)/Pa
-BOARD_WORDS = const(23)
+CONTROL_MODE = const(16)  # of the last tick
+RAMP_DONE = const(17)  # ticks
+RAMP_TICKS = const(18)
+RAMP_SHARE = const(19)  # how much of it is done, *4096
+BOARD_WORDS = const(20)
 
 # The tables of roots, see `flow`; then the rows; after them the curves.
-ROOTS = const(23)
+ROOTS = const(20)
 ROOT_STEPS = const(64)  # in each of the two tables
-ROWS = const(153)
+ROWS = const(150)
+
+ATMOSPHERE = const(101325)  # Pa
+READINGS_MIN = const(2)  # in a row that make a fault: one alone is noise
 
 # What control is to do with all bubbles: open the vents, follow the setpoints, keep all valves closed.
 VENT = const(0)

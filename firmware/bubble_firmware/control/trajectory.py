@@ -1,25 +1,77 @@
 # mypy: disable-error-code="valid-type,index,operator,arg-type"
-"""Where the bubbles are to be: targets, and the setpoints' way to them."""
+"""Second pass over all bubbles: the setpoints' way to the targets. And the targets themselves, as they are asked."""
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 
 # [constants] bubble_firmware.control.state_layout: used
-# [constants] bubble_protocol.schema.statuses: RESTING
-# [constants] bubble_protocol.steps: LEAVE
+# [constants] bubble_protocol.schema.statuses: used
+# [constants] bubble_protocol.steps: used
 _QUIESCENT = const(6)
 _SAMPLES = const(13)
 _FAULTS = const(21)
 _STATUS = const(22)
 _TARGET = const(23)
 _HEIGHT = const(24)
+_DUE = const(27)
 _SETPOINT = const(28)
+_SETPOINT_SEGMENT = const(29)
+_SETPOINT_SLOPE = const(30)
+_SETPOINT_AIR = const(31)
 _RAMP_START = const(32)
 _RAMPING = const(33)
 _HOLD_OUTPUT = const(34)
+_FIRST_SEGMENT = const(35)
+_LAST_SEGMENT = const(36)
 _ROW_WORDS = const(41)
+_KNOT_HEIGHT = const(0)
+_KNOT_AIR = const(1)
+_KNOT_SLOPE = const(3)
+_KNOT_WORDS = const(5)
+_BUBBLE_COUNT = const(0)
+_RAMP_DONE = const(17)
+_RAMP_TICKS = const(18)
+_RAMP_SHARE = const(19)
+_ROWS = const(150)
 _RESTING = const(0)
 _LEAVE = const(65535)
 # [end of constants]
+
+
+@micropython.viper
+def move_setpoints(row: ptr32, board: ptr32):
+    """Move the ramp on by a tick, and find height and air of the setpoint of every bubble that ramps and is due."""
+    if board[_RAMP_DONE] != board[_RAMP_TICKS]:
+        board[_RAMP_DONE] = board[_RAMP_DONE] + 1
+        board[_RAMP_SHARE] = (board[_RAMP_DONE] << 12) // board[_RAMP_TICKS]
+    n = board[_BUBBLE_COUNT]
+    curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
+    while n > 0:
+        if row[_DUE] & row[_RAMPING]:
+            if board[_RAMP_DONE] == board[_RAMP_TICKS]:
+                row[_RAMPING] = 0
+            height = (row[_RAMP_START] << 4) + ((row[_TARGET] - row[_RAMP_START]) * board[_RAMP_SHARE] >> 8)
+            row[_SETPOINT] = height
+            segment = row[_SETPOINT_SEGMENT]
+            knot = ptr32(uint(curves) + segment)
+            off = height - knot[_KNOT_HEIGHT]
+            while (off | knot[_KNOT_WORDS + _KNOT_HEIGHT] - height) >> 31:  # it is in another segment
+                if off < 0:
+                    if segment == row[_FIRST_SEGMENT]:
+                        off = 0
+                        break
+                    segment -= 4 * _KNOT_WORDS
+                else:
+                    if segment == row[_LAST_SEGMENT]:
+                        off = knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]
+                        break
+                    segment += 4 * _KNOT_WORDS
+                knot = ptr32(uint(curves) + segment)
+                off = height - knot[_KNOT_HEIGHT]
+            row[_SETPOINT_SEGMENT] = segment
+            row[_SETPOINT_SLOPE] = knot[_KNOT_SLOPE]
+            row[_SETPOINT_AIR] = knot[_KNOT_AIR] + (off * knot[_KNOT_SLOPE] >> 12)
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)
+        n -= 1
 
 
 @micropython.viper

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from bubble_firmware.control.bubbles import Bubbles
 
 COUNT = 4  # zero in counts, opens_us, closes_us, flow_gain
-_ZERO_PA = 1500  # as far as a good sensor may be off, see `self_test`
+ZERO_PA = 1500  # as far as a good sensor's zero may be off
 
 
 class Trim:
@@ -23,7 +23,7 @@ class Trim:
 
     def __init__(self, board: "ModuleType", bubbles: "Bubbles"):
         self._bubbles = bubbles
-        off = _ZERO_PA // board.SENSOR_PA_PER_COUNT
+        off = ZERO_PA // board.SENSOR_PA_PER_COUNT
         dead_us = board.TICK_US // 2
         gain = flow_gain(board)
         self.nominal = array("i", (board.SENSOR_ZERO, board.VALVE_OPENS_US, board.VALVE_CLOSES_US, gain))

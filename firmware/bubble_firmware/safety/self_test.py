@@ -11,8 +11,11 @@ from array import array
 from bubble_protocol.mpy_compat import const
 from bubble_protocol.schema.self_test import FAILED, NOT_RUN, PASSED, RUNNING, SKIPPED
 
+# [constants] bubble_firmware.control.trim: used
+_ZERO_PA = const(1500)
+# [end of constants]
+
 _PULSE_US = const(3000)
-_ZERO_PA = const(1500)  # as far as a good sensor may be off
 _RISE_PA = const(1000)
 _SUPPLY_PA = const(30000)
 _ZERO_US = const(50000)  # when the zeros are taken

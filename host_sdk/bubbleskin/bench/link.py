@@ -13,6 +13,7 @@ import numpy as np
 import serial
 
 from bubbleskin.bench.rows import Row, share_of
+from bubbleskin.boards import DEFAULT
 from bubbleskin.link import message
 from bubbleskin.link.link import Link, run_sync
 from bubbleskin.link.serial import SerialTransport
@@ -32,7 +33,7 @@ def far_end() -> None:
     from bubbleskin.sim.serve import PtyEnd, serve
 
     end = PtyEnd()
-    _, board = open_board("micropython", "wristband7", {})
+    _, board = open_board("micropython", DEFAULT, {})
     for _ in range(10):
         board.tick()  # The plant's first steps load what numba has compiled.
     print(end.name, flush=True)

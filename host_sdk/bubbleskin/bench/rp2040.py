@@ -10,22 +10,23 @@ from numpy.typing import NDArray
 from bubble_firmware.control import state_layout as layout
 from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.table import Tables
+from bubbleskin import boards
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.bench import float_law
 from bubbleskin.bench.rows import Row
 from bubbleskin.bench.trace import Tick, record
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.link.link import run_sync
-from bubbleskin.sim.board import load_board
 from bubbleskin.sim.rp2040 import open_chip
 from bubbleskin.sim.rp2040.chip import CLOCK_HZ, Chip
 from bubbleskin.sim.rp2040.prompt import Prompt
 from bubbleskin.sim.transport import SimulatedTransport
 from bubbleskin.skin import Skin
-from bubbleskin.toolchain.rp2040 import BARE, firmware
+from bubbleskin.toolchain.frozen import BARE
+from bubbleskin.toolchain.rp2040 import firmware
 
 _US = CLOCK_HZ // 1_000_000  # cycles
-_PERIODS = {"wristband7": (2000, 40), "wristband19": (5000, 60)}  # µs, and the share of it that a tick may take, %
+_SHARE = 40  # of its period that a whole tick may take, %
 _PHASES = (
     ("following ramps", 0.2, 0.05, 0.05),
     ("changing at once", 0.2, 0.05, 0.0),
@@ -97,8 +98,8 @@ class Replayed(NamedTuple):
 
 def rows() -> Iterator[Row]:
     """Control work against the same law in float bytecode; then whole ticks of both boards."""
-    yield from _control_rows("wristband7")
-    for board in _PERIODS:
+    yield from _control_rows(boards.DEFAULT)
+    for board in boards.NAMES:
         yield from tick_rows(board)
 
 
@@ -128,7 +129,7 @@ def _control_rows(board: str) -> Iterator[Row]:
 
 def curves(board: str) -> list[list[tuple[float, int, int]]]:
     """The curves of every bubble by the tables of `board`: knots of (height µm, air µJ, pressure Pa)."""
-    data = load_board(board)
+    data = boards.load(board)
     bubbles = Bubbles(data, Tables(data.BUBBLES))
     found = []
     for i in range(data.BUBBLES):
@@ -160,13 +161,13 @@ def replay(board: str, ticks: list[Tick], uf2: Path, law: str) -> Replayed:
 
 def tick_rows(name: str, seconds: float = 5.0) -> Iterator[Row]:
     """Whole ticks of the real UF2 with telemetry at 50 Hz and a new shape at 20 Hz, for so long in emulated time."""
-    period, share = _PERIODS[name]
+    period = boards.load(name).TICK_US
     busy = load(name, seconds)
     label = f"{name}, whole tick under load"
-    yield Row(f"{label}: mean at most", busy.mean_us, "µs emulated", f"≤ {period * share // 100}")
-    yield Row(f"the same, of {period} µs", 100 * busy.mean_us / period, "%", f"≤ {share}")
+    yield Row(f"{label}: mean at most", busy.mean_us, "µs emulated", f"≤ {period * _SHARE // 100}")
+    yield Row(f"the same, of {period} µs", 100 * busy.mean_us / period, "%", f"≤ {_SHARE}")
     yield Row("longest at most", busy.worst_us, "µs emulated")
-    if name == "wristband7":
+    if name == boards.DEFAULT:
         yield Row("mean, of the 1000 µs that 1 kHz would leave", busy.mean_us / 10, "%")
     yield Row("ticks that began late", busy.late, f"of {busy.ticks}", "0")
     yield Row("heap lost", busy.heap_lost, "bytes", "0")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bubbleskin.bench.rows import Row
+from bubbleskin.boards import DEFAULT, NAMES
 from bubbleskin.connect import connect
 
 _SECONDS = 20.0
@@ -16,11 +17,9 @@ _EVERY = 2.0
 
 def rows(size: float = 1.0) -> Iterator[Row]:
     """The firmware in process, with a new random shape every 2 s, and at rest."""
-    for url, moving, target in (
-        ("sim://wristband7", True, "≥ 20"),
-        ("sim://wristband7", False, ""),
-        ("sim://wristband19", True, ""),
-    ):
+    for board, moving in (*((name, True) for name in NAMES), (DEFAULT, False)):
+        url = f"sim://{board}"
+        target = "≥ 20" if moving and board == DEFAULT else ""
         what = f"a new shape every {_EVERY:g} s" if moving else "at rest"
         yield Row(f"{url}, {what}", _speed(url, moving, size * _SECONDS), "× real time", target)
 

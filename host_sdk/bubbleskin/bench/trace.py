@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bubbleskin.sim.board import SimulatedBoard, load_board
+from bubbleskin import boards
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
 
 BOOT_ID = 1
@@ -28,7 +29,7 @@ def record(name: str, phases: Sequence[tuple[str, float, float, float]], seed: i
 
     A phase with no shapes, 0 s between them, holds what there is.
     """
-    firmware = InProcessFirmware(load_board(name), BOOT_ID)
+    firmware = InProcessFirmware(boards.load(name), BOOT_ID)
     bubbles = firmware.app.bubbles
     step = bubbles.step
     ticks: list[Tick] = []
@@ -49,5 +50,6 @@ def record(name: str, phases: Sequence[tuple[str, float, float, float]], seed: i
                 heights = rng.integers(5500, 12500, board.data.BUBBLES).tolist()
                 firmware.app.commands.show(array("i", heights), 0, round(1000 * ramp))
                 asked = [(heights, max(1, round(ramp / board.tick_s)))]
+            firmware.app.deadman.host_activity()  # no host speaks here: without it, what moves is held after a while
             board.tick()
     return ticks

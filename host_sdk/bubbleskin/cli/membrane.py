@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
+from bubbleskin import boards
 from bubbleskin.cli.options import device, gathered
 from bubbleskin.connect import connect
 from bubbleskin.errors import InvalidInput
@@ -93,7 +94,7 @@ material_options = _options(
     size_options,
 )
 table_options = _options(
-    click.option("--board", default="wristband7", show_default=True, help="Name kept in the file."),
+    click.option("--board", default=boards.DEFAULT, show_default=True, help="Name kept in the file."),
     click.option("--knots", type=int, default=64, show_default=True, help="Knots per table, 64 at most."),
     click.option("--up-to-mm", type=float, default=14.0, show_default=True, help="Where the tables end."),
 )

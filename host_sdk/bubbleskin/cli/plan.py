@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from bubbleskin.cli.options import as_json
+from bubbleskin import boards
+from bubbleskin.cli.options import Board, as_json
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.shape import shapes
@@ -19,7 +20,6 @@ from bubbleskin.shape.heightfield import Heights
 if TYPE_CHECKING:
     from bubbleskin.planner.plan import Plan
 
-_BOARDS = {"wristband7": 7, "wristband19": 19}
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
@@ -28,7 +28,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--shape", type=click.Choice(list(shapes.SHAPES)), help="A ready-made shape.")
 @click.option("--file", "path", type=_FILE, help="A heightfield: .npy, or numbers in .csv.")
 @click.option("--from", "begin", metavar="MM,MM,…", help="Heights of the shape that the array has now. Default: flat.")
-@click.option("--board", type=click.Choice(list(_BOARDS)), default="wristband7", show_default=True)
+@click.option("--board", type=Board(), default=boards.DEFAULT, show_default=True)
 @click.option("--layout", "layout_path", type=_FILE, help="A layout of your own, in JSON, instead of a board's.")
 @click.option("--plot", type=_FILE, help="Draw the shape from the side and from above.")
 @as_json
@@ -52,7 +52,7 @@ def plan(
 
     if sum([bool(heights), shape is not None, path is not None]) != 1:
         raise InvalidInput("Say the shape in one way: a height in mm per bubble, or one of --shape and --file.")
-    layout = Layout.from_file(layout_path) if layout_path else Layout.of_board(board, _BOARDS[board])
+    layout = Layout.from_file(layout_path) if layout_path else Layout.of_board(board)
     asked: Heights = (
         shapes.load(path) if path else shapes.SHAPES[shape](layout) if shape else shapes.parse_heights(heights)
     )

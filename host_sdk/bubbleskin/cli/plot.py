@@ -9,7 +9,9 @@ import click
 from rich.console import Console
 from rich.progress import Progress
 
+from bubbleskin import boards
 from bubbleskin.cli.membrane import DATA, balloon, draw_fit, fit_file, fit_options, material_options, picture_option
+from bubbleskin.cli.options import Board
 from bubbleskin.cli.play import load
 from bubbleskin.connect import connect
 from bubbleskin.sequence.library import LIBRARY
@@ -91,7 +93,7 @@ def plot_order(output: Path) -> None:
 
 @plot.command("sequence")
 @click.argument("what", metavar=f"FILE|{'|'.join(LIBRARY)}")
-@click.option("--board", type=click.Choice(["wristband7", "wristband19"]), default="wristband7", show_default=True)
+@click.option("--board", type=Board(), default=boards.DEFAULT, show_default=True)
 @click.option("--loops", type=int, help="How often to play it all. Default: as the sequence says.")
 @click.option("--rate", type=click.IntRange(1, 50), default=15, show_default=True, help="Pictures a second.")
 @click.option("--seconds", type=float, default=30.0, show_default=True, help="At most so much of it.")
@@ -108,7 +110,7 @@ def plot_sequence(what: str, board: str, loops: int | None, rate: int, seconds: 
         film.animate(
             skin.layout, frames, output, title=sequence.name, progress=lambda done: bar.update(task, completed=done)
         )
-    click.echo(f"wrote {output} ({len(frames)} pictures of a simulated {board})", err=True)
+    click.echo(f"wrote {output} ({len(frames)} pictures of a simulated {skin.info.board})", err=True)
 
 
 commands = [plot]

@@ -3,11 +3,12 @@
 import click
 from rich.console import Console
 
-from bubbleskin.cli.options import as_json
+from bubbleskin import boards
+from bubbleskin.cli.options import Board, as_json
 
 
 @click.command()
-@click.argument("board", default="wristband7")
+@click.argument("board", type=Board(), default=boards.DEFAULT)
 @click.option(
     "--port", type=int, help="Serve on this TCP port of this machine (0: a free one) instead of a pseudo-terminal."
 )
@@ -16,7 +17,7 @@ from bubbleskin.cli.options import as_json
 @click.option("--micropython", is_flag=True, help="Run the firmware in a real MicroPython.")
 @as_json
 def sim(board: str, port: int | None, seed: int, spread: float, micropython: bool, json: bool) -> None:
-    """Serve a simulated BOARD (wristband7, wristband19) in real time, until Ctrl-C.
+    """Serve a simulated BOARD, by its name or the path of its file, in real time, until Ctrl-C.
 
     Any program can open it with pyserial: at the pseudo-terminal or the socket:// URL that is printed.
     """

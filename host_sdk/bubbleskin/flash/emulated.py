@@ -10,9 +10,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from bubbleskin import boards
 from bubbleskin.errors import LinkError
 from bubbleskin.flash.machine import Connection, Machine, Sink
-from bubbleskin.sim.board import load_board
 from bubbleskin.sim.rp2040.board import pass_over_carrier
 from bubbleskin.sim.rp2040.boot_rom import INFO, BootRom, starts
 from bubbleskin.sim.rp2040.bus import SpiBus
@@ -30,8 +30,8 @@ _READ_S = 10.0
 class EmulatedMachine(Machine):
     """The wristband `board` with `flash` in its flash chip, on a computer that shows boot loaders' drives at `drive`."""
 
-    def __init__(self, board: str, flash: bytes | bytearray, drive: Path):
-        self.data = load_board(board)
+    def __init__(self, board: str | Path, flash: bytes | bytearray, drive: Path):
+        self.data = boards.load(board)
         """The board's file."""
         self.flash = bytearray(flash).ljust(FLASH_SIZE, b"\xff")
         self.drive = drive

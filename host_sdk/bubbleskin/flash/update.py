@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from bubbleskin import boards
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.device.info import Info
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError, WrongDevice
@@ -15,7 +16,7 @@ from bubbleskin.flash.machine import Connection, Machine
 from bubbleskin.flash.prompt import Prompt
 from bubbleskin.link.link import run_sync
 from bubbleskin.skin import Skin
-from bubbleskin.toolchain.rp2040 import BOARDS, firmware
+from bubbleskin.toolchain.rp2040 import firmware
 
 _HELLO_S = 1.5  # for one attempt
 _DRIVE_S = 20.0  # until the boot loader's drive is there and mounted
@@ -105,6 +106,7 @@ class _Update:
             if self.order.uf2 or self.order.previous:
                 self.image()  # before anything is changed
                 return self.by_uf2(self.into_boot_loader())
+            self.source()  # before anything is changed
             self.restart("prompt")
         return self.at_prompt()
 
@@ -148,21 +150,34 @@ class _Update:
         )
 
     def check_board(self, info: Info) -> None:
-        if self.order.board and self.order.board != info.board:
+        asked = _name_of(self.order.board) if self.order.board else info.board
+        if asked != info.board:
             raise InvalidInput(
-                f"The board at {self.port} is a {info.board}, and {self.order.board} was asked for. Leave --board off, or "
-                f"hold BOOTSEL while you plug it in if it shall become a {self.order.board}."
+                f"The board at {self.port} is a {info.board}, and {asked} was asked for. Leave --board off, or "
+                f"hold BOOTSEL while you plug it in if it shall become a {asked}."
             )
 
     def board(self) -> str:
         """The board's name, which neither a boot loader nor a stock MicroPython knows."""
+        return self.old.board if self.old else _name_of(self.source())
+
+    def source(self) -> str:
+        """What its firmware is made for: a board's name, or the path of its file."""
+        if self.order.board:
+            return self.order.board
         if self.old:
+            if self.old.board not in boards.NAMES:
+                raise InvalidInput(
+                    f"The board at {self.port} is a {self.old.board}, which is none of {', '.join(boards.NAMES)}: "
+                    f"say where its file is, such as --board path/to/{self.old.board}.py."
+                )
             return self.old.board
-        name = self.order.board or self.under_way.board()
-        if name:
-            return name
+        begun = self.under_way.board()
+        if begun:
+            return begun
         raise InvalidInput(
-            f"Which wristband is it? Nothing of ours is on it yet to say so: add --board {' or --board '.join(BOARDS)}."
+            "Which wristband is it? Nothing of ours is on it yet to say so: add --board "
+            f"{' or --board '.join(boards.NAMES)}, or --board FILE.py for one of your own."
         )
 
     # ---- talking to it
@@ -185,7 +200,7 @@ class _Update:
     def into_boot_loader(self, prompt: Prompt | None = None) -> Path:
         """Let the board go into its boot loader; its drive."""
         before = set(self.machine.drives())
-        self.under_way.begin(self.board())
+        self.under_way.begin(self.order.board or (self.old.board if self.old else self.source()))
         if prompt:
             with contextlib.suppress(LinkError):  # it may be gone before it has acknowledged
                 prompt.leave("import machine; machine.bootloader()")
@@ -213,7 +228,7 @@ class _Update:
         """What is to be copied."""
         order = self.order
         if order.uf2:
-            named = [board for board in BOARDS if order.uf2.name.split("-")[0].split(".")[0] == board]
+            named = [board for board in boards.NAMES if order.uf2.name.split("-")[0].split(".")[0] == board]
             if named and named[0] != self.board():
                 raise InvalidInput(
                     f"{order.uf2} is made for {named[0]}, and this is a {self.board()}. Take the file for {self.board()}."
@@ -226,7 +241,7 @@ class _Update:
                     f"No earlier firmware of a {self.board()} is on this computer. Give a file: --uf2 FILE."
                 )
             return uf2.read(path)
-        return uf2.read(self.build(self.board()))
+        return uf2.read(self.build(self.source()))
 
     def by_uf2(self, drive: Path) -> Outcome:
         check_drive(drive)
@@ -237,7 +252,7 @@ class _Update:
             uf2.block(n, len(image.pages), uf2.FLASH_AT + uf2.PAGE * n, p) for n, p in enumerate(image.pages)
         )
         history.tried(known)
-        self.under_way.begin(board)
+        self.under_way.begin(self.order.board or (self.old.board if self.old else self.source()))
         copy_image(self.machine, drive, image, self.report)
         back = (
             "; `bubbleskin flash --previous` then brings the last firmware back that worked"
@@ -332,8 +347,8 @@ class _Update:
 
     def by_files(self, prompt: Prompt, there: slots.Slots) -> Outcome:
         board = self.board()
-        self.under_way.begin(board)
-        prompt = slots.update(prompt, there, self.files(board), self.report, self.try_it)
+        self.under_way.begin(self.order.board or (self.old.board if self.old else self.source()))
+        prompt = slots.update(prompt, there, self.files(self.source()), self.report, self.try_it)
         self.reset(prompt)
         info = self.wait_for_hello(
             f"The new firmware had answered, and does not after the last restart, within {_BACK_S:g} s. Unplug the "
@@ -379,3 +394,9 @@ class _Update:
             if problem:
                 return f"MicroPython says: {problem}."
         return "Unplug it, plug it in, then flash again."
+
+
+def _name_of(board: str) -> str:
+    """The name of a board, given by its name or by the path of its file."""
+    name: str = boards.load(board).NAME if boards.is_file(board) else board
+    return name

@@ -12,6 +12,7 @@ from typing import Any
 import serial  # pyserial, not this module
 from serial.tools import list_ports
 
+from bubbleskin.boards import DEFAULT
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.link.errors import connection_lost
 from bubbleskin.link.transport import Transport
@@ -166,7 +167,7 @@ def only_attached() -> str:
     ports = attached()
     if not ports:
         raise LinkError(
-            "No wristband is attached. Plug one in, name its port, or use a simulated one: sim://wristband7."
+            f"No wristband is attached. Plug one in, name its port, or use a simulated one: sim://{DEFAULT}."
         )
     if len(ports) > 1:
         raise LinkError(f"{len(ports)} wristbands are attached, at {', '.join(ports)}: name the one you mean.")
@@ -180,7 +181,7 @@ def _why_not(url: str, error: Exception) -> str:
     if code == errno.ENOENT or "could not find" in text:
         ports = [port.device for port in list_ports.comports()]
         there = f"The ports here are {', '.join(sorted(ports))}." if ports else "No serial port is here at all."
-        return f"There is no {url}. {there} Without a wristband, use sim://wristband7."
+        return f"There is no {url}. {there} Without a wristband, use sim://{DEFAULT}."
     if code in (errno.EACCES, errno.EPERM):
         return f"You may not open {url}. On Linux, join its group (often `sudo usermod -aG dialout $USER`) and log in again."
     if code in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK) or "exclusively lock" in text:

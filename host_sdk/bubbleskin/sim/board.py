@@ -3,13 +3,14 @@
 import math
 from abc import ABC, abstractmethod
 from array import array
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bubble_firmware import boards
 from bubble_firmware.hal.lockstep import LINK_IN
+from bubbleskin import boards
 from bubbleskin.contact.model import CompliantContact
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
@@ -17,27 +18,25 @@ from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.plant import Plant, PlantParameters
 
-BOARDS = ("wristband7", "wristband19")
-
 
 class Simulated(ABC):
     """A simulated wristband in virtual time: it moves only when it is stepped, and the same calls give the same bytes.
 
-    What the link, the simulator's server and a script need of one, whatever runs its firmware. `name`, `seed`, `spread`
+    What the link, the simulator's server and a script need of one, whatever runs its firmware. `board`, `seed`, `spread`
     and `contact` are those of `SimulatedBoard`.
     """
 
-    def __init__(self, name: str, *, seed: int = 0, spread: float = 0.0, contact: bool = True):
-        self.data = load_board(name)
+    def __init__(self, board: str | Path, *, seed: int = 0, spread: float = 0.0, contact: bool = True):
+        self.data = boards.load(board)
         """The board's file."""
         if not (math.isfinite(spread) and 0 <= spread <= 0.5):
             raise InvalidInput(f"spread is {spread}; give a share from 0 to 0.5, such as 0.1 for ± 10 %.")
         if seed < 0:
             raise InvalidInput(f"seed is {seed}; give a whole number from 0.")
-        self.name = name
+        self.name: str = self.data.NAME
         self.tick_s: float = self.data.TICK_US * 1e-6
         """Length of one control period, s."""
-        self.plant = make_plant(name, self.data.BUBBLES, seed, spread, contact)
+        self.plant = make_plant(self.data, seed, spread, contact)
         self.to_device = bytearray()
         """Bytes of the link that the firmware has not read yet."""
         self.from_device = bytearray()
@@ -86,7 +85,7 @@ class Simulated(ABC):
 class SimulatedBoard(Simulated):
     """A simulated wristband whose firmware and plant are stepped in lockstep, in virtual time.
 
-    `name`: wristband7 or wristband19. `seed`: of sensor noise and spread. `spread`: how much walls, valves and
+    `board`: its name, or the path of its file. `seed`: of sensor noise and spread. `spread`: how much walls, valves and
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
     reservoir starts full, as on a board that has been powered for a while. `contact`: whether bubbles push each
     other, as real ones do; without it each is alone, which shows what the control law itself does. `firmware`: what
@@ -95,7 +94,7 @@ class SimulatedBoard(Simulated):
 
     def __init__(
         self,
-        name: str = "wristband7",
+        board: str | Path = boards.DEFAULT,
         *,
         seed: int = 0,
         spread: float = 0.0,
@@ -103,7 +102,7 @@ class SimulatedBoard(Simulated):
         firmware: Firmware | None = None,
         flash: NorFlash | None = None,
     ):
-        super().__init__(name, seed=seed, spread=spread, contact=contact)
+        super().__init__(board, seed=seed, spread=spread, contact=contact)
         n = self.data.BUBBLES
         self.firmware = firmware or InProcessFirmware(self.data, seed + 1, flash)
         self._pulses = np.zeros((n, 2))
@@ -172,14 +171,9 @@ class SimulatedBoard(Simulated):
         self.firmware.close()
 
 
-def make_plant(name: str, n: int, seed: int, spread: float, contact: bool) -> Plant:
-    """The bubbles of board `name`; the rest as of `SimulatedBoard`."""
+def make_plant(data: ModuleType, seed: int, spread: float, contact: bool) -> Plant:
+    """The bubbles of a board, where its layout says; the rest as of `SimulatedBoard`."""
+    n = data.BUBBLES
     parameters = PlantParameters.spread(n, spread, seed) if spread else PlantParameters.nominal(n)
-    return Plant(parameters, seed=seed, contact=CompliantContact(Layout.of_board(name, n)) if contact else None)
-
-
-def load_board(name: str) -> ModuleType:
-    """The data of a board that can be simulated."""
-    if name not in BOARDS:
-        raise InvalidInput(f"There is no board {name!r} to simulate; there are {' and '.join(BOARDS)}.")
-    return boards.load(name)
+    layout = Layout.from_um(data.LAYOUT, data.PITCH_UM)
+    return Plant(parameters, seed=seed, contact=CompliantContact(layout) if contact else None)

@@ -12,6 +12,7 @@ from types import ModuleType
 import bubble_firmware
 import bubble_protocol
 from bubble_firmware.hal.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
+from bubbleskin import boards
 from bubbleskin.errors import LinkError
 from bubbleskin.sim.firmware import Firmware, Outputs
 from bubbleskin.toolchain.interpreter import find_micropython
@@ -27,7 +28,8 @@ import gc, sys
 gc.threshold(16384)  # bytes: what compiling leaves behind goes at once, or the code lies all over the heap
 sys.path[:] = {path!r}
 from bubble_firmware.main import lockstep
-lockstep({board!r}, {boot_id})
+{import_board}
+lockstep(board, {boot_id})
 """
 
 
@@ -41,7 +43,14 @@ class MicroPythonFirmware(Firmware):
 
     def __init__(self, board: ModuleType, boot_id: int):
         interpreter = find_micropython()
-        program = _PROGRAM.format(path=source_path(), board=board.NAME, boot_id=boot_id)
+        path = source_path()
+        own = boards.own_file(board)
+        if own:
+            path.append(str(own.parent))
+        import_board = (
+            f"import {board.NAME} as board" if own else f"from bubble_firmware.boards import {board.NAME} as board"
+        )
+        program = _PROGRAM.format(path=path, import_board=import_board, boot_id=boot_id)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has died
         try:
             self._process = subprocess.Popen(

@@ -1,8 +1,9 @@
 """The link to a simulated board: reading with a timeout lets virtual time pass."""
 
+from bubbleskin import boards
 from bubbleskin.errors import LinkError
 from bubbleskin.link.transport import Transport
-from bubbleskin.sim.board import Simulated, SimulatedBoard, load_board
+from bubbleskin.sim.board import Simulated, SimulatedBoard
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.impairment import Impairment, LossyTransport
 from bubbleskin.sim.options import Options
@@ -57,7 +58,10 @@ class SimulatedTransport(Transport):
 
 
 def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transport, Simulated]:
-    """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it."""
+    """The board of `sim://name?…`, `micropython://name?…` or `rp2040://name?…`, and the link to it.
+
+    `name`: a board's, or the path of a board's file.
+    """
     url = f"{scheme}://{name}"
     chosen = Options.parse(options, url)
     impairment = Impairment(drop=chosen.loss)  # refused before anything is started
@@ -67,7 +71,7 @@ def open_board(scheme: str, name: str, options: dict[str, str]) -> tuple[Transpo
 
 
 def _start(scheme: str, name: str, chosen: Options) -> Simulated:
-    data = load_board(name)
+    data = boards.load(name)
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip
 

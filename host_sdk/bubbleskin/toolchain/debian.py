@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.commands import CommandRunner, tail
 from bubbleskin.toolchain.interpreter import VERSION
-from bubbleskin.toolchain.steps import Steps, end_of
 
 SUITE = "trixie"
 """The Debian release whose source package is `VERSION`."""
@@ -85,7 +85,7 @@ def machine_sources() -> list[dict[str, str]]:
     return stanzas
 
 
-def install(packages: list[str], steps: Steps) -> None:
+def install(packages: list[str], runner: CommandRunner) -> None:
     """Install Debian packages if we may; else say how."""
     if not packages:
         return
@@ -98,15 +98,15 @@ def install(packages: list[str], steps: Steps) -> None:
     options = ["-y", "--no-install-recommends", "-oDPkg::Lock::Timeout=120"]
     command = ["apt-get", "install", *options, *packages]
     # A bare machine has no package lists, and old ones may name files that are gone.
-    if steps.try_run(f"Installing {names}", command, env=quiet):
-        steps.try_run("Updating apt's lists", ["apt-get", "update"], env=quiet)
-        steps.run(f"Installing {names}", command, env=quiet)
+    if runner.try_run(f"Installing {names}", command, env=quiet):
+        runner.try_run("Updating apt's lists", ["apt-get", "update"], env=quiet)
+        runner.run(f"Installing {names}", command, env=quiet)
 
 
 class DebianRoot:
     """An apt root inside `folder`, with the archives of `SUITE` and nothing else in it."""
 
-    def __init__(self, folder: Path, steps: Steps) -> None:
+    def __init__(self, folder: Path, runner: CommandRunner) -> None:
         sources = turn_to_suite(machine_sources(), SUITE)
         if not sources:
             raise BubbleskinError("the machine's apt configuration names no Debian archive.")
@@ -123,9 +123,9 @@ class DebianRoot:
         }
         self._apt = ["apt-get", *(f"-o{name}={value}" for name, value in settings.items())]
         self._folder = folder
-        self._steps = steps
+        self._runner = runner
         # One of several archives may lack the suite; what counts is whether the packages then come.
-        self._update = steps.try_run("Reading the source lists", [*self._apt, "update"])
+        self._update = runner.try_run("Reading the source lists", [*self._apt, "update"])
 
     def micropython(self) -> Path:
         """MicroPython's source, unpacked."""
@@ -136,7 +136,7 @@ class DebianRoot:
             names = ", ".join(path.stem for path in offered)
             raise BubbleskinError(f"version {VERSION} is wanted, and apt offers {names}.")
         source = self._folder / "source"
-        self._steps.run("Unpacking the source", ["dpkg-source", "-x", str(wanted[0]), str(source)])
+        self._runner.run("Unpacking the source", ["dpkg-source", "-x", str(wanted[0]), str(source)])
         return source
 
     def package(self, name: str) -> Path:
@@ -146,10 +146,10 @@ class DebianRoot:
         if len(offered) != 1:
             raise BubbleskinError(f"apt brought {len(offered)} packages called {name} where one was asked for.")
         unpacked = self._folder / name
-        self._steps.run(f"Unpacking {name}", ["dpkg-deb", "-x", str(offered[0]), str(unpacked)])
+        self._runner.run(f"Unpacking {name}", ["dpkg-deb", "-x", str(offered[0]), str(unpacked)])
         return unpacked
 
     def _fetch(self, title: str, *arguments: str) -> None:
-        log = self._steps.try_run(title, [*self._apt, *arguments], folder=self._folder)
+        log = self._runner.try_run(title, [*self._apt, *arguments], folder=self._folder)
         if log:
-            raise BubbleskinError(f"apt could not fetch {arguments[-1]}.\n{end_of(self._update or log)}")
+            raise BubbleskinError(f"apt could not fetch {arguments[-1]}.\n{tail(self._update or log)}")

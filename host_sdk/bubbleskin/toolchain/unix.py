@@ -15,9 +15,9 @@ import time
 from pathlib import Path
 
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.commands import CommandRunner, environment, locked
 from bubbleskin.toolchain.debian import DebianRoot, install
 from bubbleskin.toolchain.interpreter import BUILD_OPTIONS, VERSION, build_folder, cache_folder, own_micropython
-from bubbleskin.toolchain.steps import Steps, environment, locked
 
 INSTEAD = "Set MICROPYTHON=/path/to/micropython to use your own 32-bit build instead."
 
@@ -78,7 +78,7 @@ def missing_packages(*, from_package: bool) -> list[str]:
     return missing
 
 
-def compile_source(source: Path, folder: Path, steps: Steps, tag: str | None) -> list[Path]:
+def compile_source(source: Path, folder: Path, runner: CommandRunner, tag: str | None) -> list[Path]:
     """Compile mpy-cross and the interpreter from `source`, with everything that is written in `folder`."""
     settings = {"MICROPY_GIT_TAG": tag} if tag else {}
     # A repository around the source is not its version.
@@ -87,9 +87,9 @@ def compile_source(source: Path, folder: Path, steps: Steps, tag: str | None) ->
     make = ["make", f"-j{os.cpu_count() or 1}", f"PYTHON={sys.executable}", "CFLAGS_EXTRA=-Wno-error"]
     cross, unix = folder / "mpy-cross", folder / "unix"
     command = [*make, f"--directory={source}/mpy-cross", f"BUILD={cross}"]
-    steps.run("Compiling mpy-cross", command, env=env)
+    runner.run("Compiling mpy-cross", command, env=env)
     command = [*make, f"--directory={source}/ports/unix", f"BUILD={unix}", *BUILD_OPTIONS]
-    steps.run("Compiling MicroPython", command, env=env)
+    runner.run("Compiling MicroPython", command, env=env)
     return [cross / "mpy-cross", unix / "micropython"]
 
 
@@ -137,17 +137,17 @@ def build(folder: Path, checkout: Path | None, *, force: bool) -> None:
     try:
         check_machine(checkout)
         home = folder.parent
-        steps = Steps(home / "logs")
+        runner = CommandRunner(home / "logs")
         asked = time.time()
-        with locked(home / "lock", steps):
+        with locked(home / "lock", runner):
             interpreter = folder / "micropython"
             if interpreter.is_file() and (not force or interpreter.stat().st_ctime > asked):
                 return  # another call built it while we waited
-            install(missing_packages(from_package=checkout is None), steps)
+            install(missing_packages(from_package=checkout is None), runner)
             with tempfile.TemporaryDirectory(prefix="micropython-") as name:
-                source = checkout or DebianRoot(Path(name), steps).micropython()
+                source = checkout or DebianRoot(Path(name), runner).micropython()
                 tag = None if checkout else f"v{VERSION}"  # a checkout describes itself
-                keep(compile_source(source, Path(name) / "build", steps, tag), folder)
+                keep(compile_source(source, Path(name) / "build", runner, tag), folder)
     except (BubbleskinError, OSError) as problem:
         raise BubbleskinError(f"MicroPython cannot be built here: {problem}\n{INSTEAD}") from problem
 

@@ -14,7 +14,7 @@ REPLY = 0x80
 
 HELLO, PING, INFO, SHOW, STATE, SUBSCRIBE, TELEMETRY = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
 TABLE_WRITE, TABLE_COMMIT, TABLE_READ, STOP, VENT, CLEAR = 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D
-TICKS, RESTART = 0x0E, 0x0F
+TICKS, RESTART, LAYOUT = 0x0E, 0x0F, 0x10
 STORE_SAVE, STORE_INFO, STORE_RESET, TRIM_WRITE, TRIM_READ = 0x16, 0x17, 0x18, 0x19, 0x1A
 SEQUENCE_BEGIN, SEQUENCE_WRITE, SEQUENCE_ARM, SEQUENCE_START = 0x20, 0x21, 0x22, 0x23
 SEQUENCE_CONTROL, SEQUENCE_STATE, SEQUENCE_EVENT = 0x24, 0x25, 0x26
@@ -472,6 +472,17 @@ MESSAGES = (
         ),
         (),
         "refused, nothing was changed; in place of the reply",
+    ),
+    (LAYOUT, "LAYOUT", (), (), "where are your bubbles?"),
+    (
+        LAYOUT | REPLY,
+        "LAYOUT_REPLY",
+        (_TICKS, ("pitch_um", U32, "µm", None, None, "distance between the centres of neighbours")),
+        (
+            ("x_um", I32, "µm", None, None, "to the right, seen from above"),
+            ("y_um", I32, "µm", None, None, "up"),
+        ),
+        "the centre of each bubble",
     ),
 )
 

@@ -1,13 +1,14 @@
 """What a device can do, how its time wraps, and what RESTART leads to."""
 
 # Bits of `capabilities`.
-DELIVERY, SAFETY, STORE, CAN_SEQUENCES, CAN_CHOOSE_TELEMETRY = 1, 2, 4, 8, 16
+DELIVERY, SAFETY, STORE, CAN_SEQUENCES, CAN_CHOOSE_TELEMETRY, CAN_TELL_LAYOUT = 1, 2, 4, 8, 16, 32
 CAPABILITIES = (
     (DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),
     (SAFETY, "safety", "a deadman, a fault log, settings"),
     (STORE, "store", "tables, settings and figures can be stored"),
     (CAN_SEQUENCES, "sequences", "sequences are played on the device's own clock"),
     (CAN_CHOOSE_TELEMETRY, "telemetry_fields", "SUBSCRIBE_FIELDS: telemetry of chosen columns"),
+    (CAN_TELL_LAYOUT, "layout", "LAYOUT: where its bubbles are"),
 )
 
 TICKS_WRAP = 1 << 30  # device time counts up to here and goes on from 0: after 62 days at 5 ms. No integer becomes long

@@ -33,7 +33,7 @@ def pass_over_carrier(chip: Chip, data: ModuleType) -> None:
 
 
 class Rp2040Board(Simulated):
-    """The board `name`, running the UF2 at `firmware`, in emulated time.
+    """The board called `board`, or of that file, running the UF2 at `firmware`, in emulated time.
 
     `seed`, `spread` and `contact` are those of `SimulatedBoard`. `absent`: chips that are not soldered in, such as
     "converter0" or "driver2".
@@ -41,7 +41,7 @@ class Rp2040Board(Simulated):
 
     def __init__(
         self,
-        name: str,
+        board: str | Path,
         firmware: Path,
         *,
         seed: int = 0,
@@ -49,7 +49,7 @@ class Rp2040Board(Simulated):
         contact: bool = True,
         absent: tuple[str, ...] = (),
     ):
-        super().__init__(name, seed=seed, spread=spread, contact=contact)
+        super().__init__(board, seed=seed, spread=spread, contact=contact)
         self.chip = Chip(firmware)
         self.from_device = self.chip.from_device
         self._supply_lost = False

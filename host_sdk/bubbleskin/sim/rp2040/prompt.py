@@ -10,7 +10,7 @@ _STEP = 1e-3
 
 
 class Prompt:
-    """The prompt of `chip`, whose firmware must have left it alone: that of `bubbleskin.toolchain.rp2040.BARE`."""
+    """The prompt of `chip`, whose firmware must have left it alone: that of `bubbleskin.toolchain.frozen.BARE`."""
 
     def __init__(self, chip: Chip):
         self.chip = chip

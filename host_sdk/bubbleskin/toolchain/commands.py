@@ -1,4 +1,4 @@
-"""The steps of a build: a status line and a log for each, and a lock so that two builds do not meet."""
+"""The commands of a build: a status line and a log for each, and a lock so that two builds do not meet."""
 
 import fcntl
 import os
@@ -15,7 +15,7 @@ RELEASED = "1744675200"
 """`SOURCE_DATE_EPOCH` of every build: the day MicroPython 1.25.0 came out, so that two builds are the same."""
 
 # These must not reach into the build: a `make` around us hands its own flags down, a shell compiler flags.
-KEPT_OUT = [
+CLEARED = [
     "MAKEFLAGS",
     "MFLAGS",
     "MAKELEVEL",
@@ -31,11 +31,11 @@ KEPT_OUT = [
 def environment(**settings: str) -> dict[str, str]:
     """The environment of a build: this one's, without what would change the outcome, and `settings`."""
     fixed = {"SOURCE_DATE_EPOCH": RELEASED, "PYTHONDONTWRITEBYTECODE": "1", "LC_ALL": "C.UTF-8", "TZ": "UTC"}
-    return {name: value for name, value in os.environ.items() if name not in KEPT_OUT} | fixed | settings
+    return {name: value for name, value in os.environ.items() if name not in CLEARED} | fixed | settings
 
 
-class Steps:
-    """Runs the steps of a build, each with a status line and a log of its own in the folder `logs`."""
+class CommandRunner:
+    """Runs the commands of a build, each with a status line and a log of its own in the folder `logs`."""
 
     def __init__(self, logs: Path) -> None:
         from rich.console import Console  # only a build needs it, and it is most of a cached call's time
@@ -67,19 +67,19 @@ class Steps:
         """Run `command`; if it fails, raise `BubbleskinError` with the end of its log."""
         log = self.try_run(title, command, env=env)
         if log:
-            raise BubbleskinError(f"the step “{title}” failed.\n{end_of(log)}")
+            raise BubbleskinError(f"the command “{title}” failed.\n{tail(log)}")
 
 
-def end_of(log: Path) -> str:
+def tail(log: Path) -> str:
     """The last 20 lines of a log, and where the rest is."""
     lines = log.read_text(errors="replace").splitlines()[-20:]
     return "\n".join(f"    {line}" for line in lines) + f"\nThe whole log: {log}\n"
 
 
 @contextmanager
-def locked(path: Path, steps: Steps) -> Iterator[None]:
+def locked(path: Path, runner: CommandRunner) -> Iterator[None]:
     """Hold the lock file `path`; a second build waits for the first."""
     with path.open("w") as file:
-        with steps.console.status("Waiting for another build of MicroPython …"):
+        with runner.console.status("Waiting for another build of MicroPython …"):
             fcntl.flock(file, fcntl.LOCK_EX)
         yield
