@@ -33,7 +33,10 @@ def micropython(tmp_path_factory):
     def run(script: str, stdin: str = "", timeout: float = 60.0) -> str:
         path = folder / "script.py"
         # All on the first line, so that line numbers in a traceback are the script's plus one.
-        path.write_text(f"import sys; sys.path[:] = {source_path()!r}\n{dedent(script).lstrip()}", encoding="utf-8")
+        path.write_text(
+            f"import gc, sys; gc.threshold(16384); sys.path[:] = {source_path()!r}\n{dedent(script).lstrip()}",
+            encoding="utf-8",
+        )
         done = subprocess.run(
             [interpreter, "-X", f"heapsize={HEAP}", path],
             input=stdin,

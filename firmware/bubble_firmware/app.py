@@ -1,298 +1,198 @@
-"""The tick: sense, estimate, watch, control, act, talk. What the board as a whole does is decided here.
+"""The tick: what the firmware does in every period, and in what order.
 
-`hands` is the board's hardware, or what stands in for it:
-
-    wait() -> periods           until the next period has begun; how many have, 0: there will be no more, LISTEN: none yet,
-                                but there is time for a look at the link
-    sense(counts)               fill in one count per bubble, then the supply's; 0xFFFF where no chip answers
-    act(pulses, pump, dump)     outputs of the next period: fill and vent µs per bubble, pump 0 to 65535
-    vent()                      the safe outputs, at once: fill closed, vent open, pump off
-    receive(buffer) -> n        bytes that have come over the link, without waiting
-    send(frame, length) -> bool whether there was room for the whole frame
-    phase_us() -> µs            since this tick's period began
-    alive(mode, faults)         a tick has gone well: feeds the watchdog
-    clear()                     try again what has failed
-    slack()                     this tick may take long, and harms nobody: the bubbles are vented
-    tidy()                      make use of a moment when nothing is urgent
-    restart(into)               start again, see RESTART
-    boot_id, late_ticks         another number each boot; ticks that began late
-    alarms                      board faults that are there now, bits
-    boot_faults                 board faults since boot, bits
-    self_test                   whether there is hardware to test
-    flash                       where the store is, see `store`; None where there is none
+Whatever goes wrong in it, the bubbles are vented and the next tick is tried. It allocates nothing: a collection takes longer
+than a tick.
 """
 
 import gc
 from array import array
 
+from bubble_firmware.board_state import BoardState
+from bubble_firmware.commands import Commands
 from bubble_firmware.control.bubbles import Bubbles
-from bubble_firmware.control.supply import Supply
 from bubble_firmware.control.table import Tables
 from bubble_firmware.control.trim import Trim
-from bubble_firmware.handlers.layout import LayoutRequests
-from bubble_firmware.handlers.sequence import SequenceRequests
-from bubble_firmware.handlers.store import StoreRequests
-from bubble_firmware.link.server import Session
-from bubble_firmware.safety import state
-from bubble_firmware.safety.deadman import Deadman
-from bubble_firmware.safety.fault_log import FaultLog
-from bubble_firmware.safety.fault_monitor import FaultMonitor
-from bubble_firmware.safety.self_test import SelfTest
+from bubble_firmware.handlers.faults import FaultHandlers
+from bubble_firmware.handlers.layout import LayoutHandlers
+from bubble_firmware.handlers.sequence import SequenceHandlers
+from bubble_firmware.handlers.session import SessionHandlers
+from bubble_firmware.handlers.settings import SettingHandlers
+from bubble_firmware.handlers.shape import ShapeHandlers
+from bubble_firmware.handlers.store import StoreHandlers
+from bubble_firmware.handlers.system import SystemHandlers
+from bubble_firmware.handlers.tables import TableHandlers
+from bubble_firmware.handlers.trim import TrimHandlers
+from bubble_firmware.link.server import Server
 from bubble_firmware.sequence.player import Player
+from bubble_firmware.store.record import Content
 from bubble_firmware.store.settings import Settings
 from bubble_firmware.store.slots import Store
-from bubble_firmware.tick_stats import bins, count, later
-from bubble_protocol.mpy_compat import const
-from bubble_protocol.schema import faults, modes, settings
-from bubble_protocol.schema.faults import ESTOP, EXCEPTION, OVERFILLED, SELF_TEST, SUPPLY_LOST, VENTING
-from bubble_protocol.schema.modes import ACTIVE, HOLDING, IDLE
+from bubble_firmware.tick_stats import TickStats
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
-# [constants] bubble_firmware.safety.watch_layout: used
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from bubble_firmware.hal.base import Hal
+
+# [constants] bubble_protocol.schema.faults: OVERFILLED SELF_TEST
+# [constants] bubble_protocol.schema.modes: BOOT IDLE
+# [constants] bubble_firmware.safety.state: NO_EVENT TESTED as EVENT_TESTED
+# [constants] bubble_firmware.safety.watch_layout: NEW_FAULT MOVING_BUBBLE PRESSED_BUBBLE OVERFILLED_BUBBLE
+_OVERFILLED = const(128)
+_SELF_TEST = const(64)
+_BOOT = const(3)
+_IDLE = const(0)
+_NO_EVENT = const(-1)
+_EVENT_TESTED = const(0)
 _NEW_FAULT = const(1)
 _MOVING_BUBBLE = const(2)
 _PRESSED_BUBBLE = const(4)
 _OVERFILLED_BUBBLE = const(8)
 # [end of constants]
 
-_TIDY_MASK = 1023  # ticks
-
-
-LISTEN = -1
+_IDLE_MASK = const(1023)  # ticks
 
 
 class App:
-    """The firmware of one board. Call `tick` once per period; it catches everything and allocates nothing."""
+    """The firmware of `board` on `hal`. Call `tick` once per period, and `listen` between two where there is time."""
 
-    def __init__(self, board, hands):
+    def __init__(self, board: "ModuleType", hal: "Hal"):
         gc.collect()  # or what imports have left behind splits the heap where the bubbles' state is to go in one piece
         self.board = board
-        self.hands = hands
-        self.ticks = -1  # the first is 0
-        self.faults = 0
-        self.exceptions = 0
-        self.tick_worst_us = 0
-        self.work_us = board.TICK_US // 50
-        self.delay_us = board.TICK_US // 250
-        self.worked = bins()
-        self.delayed = bins()
+        self.hal = hal
+        self.stats = TickStats(board)
         self.tables = Tables(board.BUBBLES)
         self.bubbles = Bubbles(board, self.tables)
-        self.supply = Supply(board)
-        self.self_test = SelfTest(board, hands.self_test)
-        self.safety = state.SafetyState(board)
-        self.deadman = Deadman(board)
-        self.settings = Settings(board)
-        self.fault_monitor = FaultMonitor(board, self.bubbles)
-        self.log = FaultLog()
-        self._fault_id = 0  # of the board's newest fault
-        self._fault_ids = array("i", bytearray(4 * board.BUBBLES))  # of each bubble's
-        self._moving = 0
-        self.fault(hands.boot_faults)
-        self.figures = Trim(board, self.bubbles)
-        self.store = Store(self, getattr(hands, "flash", None))
-        self.use_settings()
-        self.player = Player(self)
-        self.session = Session(self)
-        StoreRequests(self, self.session)
-        self.sequence_requests = SequenceRequests(self, self.session)
-        LayoutRequests(self, self.session)
+        self.trim = Trim(board, self.bubbles)
+        self.state = state = BoardState(board, hal.self_test, self.bubbles)
+        self.clock = state.clock
+        self.supply = state.supply
+        self.self_test = state.self_test
+        self.safety = state.safety
+        self.deadman = state.deadman
+        self.fault_monitor = state.fault_monitor
+        self.faults = state.faults
+        self.faults.latch_board(hal.boot_faults)
+        self.settings = Settings(board, self.deadman, self.fault_monitor)
+        content = Content(board, self.tables, self.bubbles, self.trim, self.settings)
+        self.store = Store(board.NAME, hal.flash, content)
+        self.player = Player(board, state, self.bubbles)
+        self.commands = Commands(board, hal, state, self.bubbles, self.player)
+        self.server = Server(board, hal, state, self.bubbles)
+        reply = self.server.reply
+        self.sequence_handlers = SequenceHandlers(self.server.sender, reply, board, state, self.player, self.commands)
+        for handlers in (
+            SessionHandlers(self.server, board, hal, self.clock, self.tables),
+            ShapeHandlers(reply, board, state, self.bubbles, self.commands),
+            TableHandlers(reply, board, self.tables, self.bubbles),
+            TrimHandlers(reply, board, self.safety, self.trim),
+            StoreHandlers(reply, hal, state, self.store),
+            LayoutHandlers(reply, board, self.clock),
+            SettingHandlers(reply, self.clock, self.settings),
+            FaultHandlers(reply, state, self.commands),
+            SystemHandlers(self.server, hal, state, self.stats, self.tables, self.store, self.commands),
+            self.sequence_handlers,
+        ):
+            self.server.register(handlers)
         self._counts = array("H", bytearray(2 * (board.BUBBLES + 1)))
-        hands.vent()
+        self._moves = 0  # whether bubbles moved in the last tick
+        hal.safe_outputs()
 
-    def tick(self):
-        """One period. Whatever goes wrong in it, the outputs go to vent and the next one is tried."""
-        self.ticks = later(self.ticks, 1)
+    def tick(self) -> None:
+        """One period: sense, decide, act, then talk."""
+        self.clock.advance(1)
         try:
             self._control()
         except Exception:
             self._fail()
         try:  # a board that cannot control still says so
-            self._talk()
+            self._communicate()
         except Exception:
             self._fail()
-            self.session.fail()
+            self.server.fail()
 
-    def listen(self):
+    def listen(self) -> None:
         """Between two ticks, when there is time: answer what has come over the link."""
         try:
-            self.session.listen()
+            self.server.listen()
         except Exception:
             self._fail()
-            self.session.fail()
+            self.server.fail()
 
-    @property
-    def mode(self):
-        """The state of the board, one of MODES."""
-        return self.safety.mode
-
-    def _control(self):
-        hands = self.hands
+    def _control(self) -> None:
+        hal = self.hal
         supply = self.supply
         bubbles = self.bubbles
+        safety = self.safety
         counts = self._counts
-        count(self.delayed, hands.phase_us(), self.delay_us)
-        hands.sense(counts)
+        self.stats.began(hal.phase_us())
+
+        # What is there? Counts of all sensors, and faults of the board.
+        hal.read_sensors(counts)
         supply.sense(counts[bubbles.count])
-        if hands.alarms or supply.lost:
-            self._alarm(hands.alarms)
-        silence = self.deadman.tick(self.safety.mode, self._moving)
-        if silence != state.NO_EVENT:
-            self._silence(silence)
+        if hal.active_faults or supply.lost:
+            self.commands.fault(hal.active_faults)
+
+        # Where are the bubbles to go? Nowhere without a host that lives; else on with what it has asked for.
+        event = self.deadman.tick(safety.mode, self._moves)
+        if event != _NO_EVENT:
+            self.commands.host_silent(event)
         if self.player.running:
-            self.player.tick()
-        bubbles.step(counts, supply.pressure_pa, self.safety.control_mode)
+            self.commands.finish(self.player.tick())
+
+        # How long does each valve open? Estimates and pulses of all bubbles.
+        bubbles.step(counts, supply.pressure_pa, safety.control_mode)
         self.fault_monitor.block_backflow(supply.pressure_pa)
+
+        # Is any of it wrong? A bubble with a fault is vented from the next tick on.
         found = self.fault_monitor.check()
-        self._moving = found & _MOVING_BUBBLE
-        self.safety.update_venting(found & _PRESSED_BUBBLE)
+        self._moves = found & _MOVING_BUBBLE
+        safety.update_venting(found & _PRESSED_BUBBLE)
         if found & (_NEW_FAULT | _OVERFILLED_BUBBLE):
-            self._found(found)
-        if self.safety.mode == modes.BOOT:
+            self.faults.latch_bubbles()
+            if found & _OVERFILLED_BUBBLE:
+                self.commands.fault(_OVERFILLED)
+        if safety.mode == _BOOT:
             self._test()
-        if self.faults & OVERFILLED:  # nothing more into it
-            hands.act(bubbles.pulses, 0, 1)
+
+        # Do it.
+        if self.faults.board & _OVERFILLED:  # nothing more into it
+            hal.write_outputs(bubbles.pulses, 0, 1)
         else:
-            hands.act(bubbles.pulses, supply.pump, supply.dump)
-        hands.alive(self.safety.mode, self.faults)
+            hal.write_outputs(bubbles.pulses, supply.pump, supply.dump)
+        hal.feed_watchdog(safety.mode, self.faults.board)
 
-    def _talk(self):
-        hands = self.hands
-        self.session.poll()
-        if self.player.waiting_news:
-            self.sequence_requests.tell()
-        if not self.ticks & _TIDY_MASK and self.safety.mode == IDLE:
-            hands.tidy()
-        spent = hands.phase_us()
-        count(self.worked, spent, self.work_us)
-        if spent > self.tick_worst_us:
-            self.tick_worst_us = spent
+    def _test(self) -> None:
+        """The self-test at boot, on top of what control has decided."""
+        test = self.self_test
+        if test.running:
+            test.tick(self.bubbles, self.supply)
+        if not test.running:
+            if test.failed:
+                self.faults.latch_board(_SELF_TEST)
+            self.safety.handle(_EVENT_TESTED)
 
-    def _fail(self):
-        self.hands.vent()  # first of all
-        self.exceptions += 1
-        self.fault(EXCEPTION)
-        self.safety.handle(state.EXCEPTION)
-        self.player.cancel()
-        self.bubbles.retract()
+    def _communicate(self) -> None:
+        hal = self.hal
+        self.server.poll()
+        if self.player.events_waiting:
+            self.sequence_handlers.send_events()
+        if not self.clock.ticks & _IDLE_MASK and self.safety.mode == _IDLE:
+            hal.idle()
+        self.stats.ended(hal.phase_us())
 
-    def _alarm(self, alarms):
-        if self.supply.lost:
-            alarms |= SUPPLY_LOST
-        self.fault(alarms)
-        if alarms & VENTING:
-            self.hands.vent()
-            self.self_test.skip()
-            self.player.cancel()
-            if self.safety.handle(state.ESTOP if alarms & ESTOP else state.BOARD_FAULT):
-                self.bubbles.retract()
-
-    def _silence(self, event):
-        if self.safety.handle(event):
-            self.player.cancel()
-            ms = self.deadman.silent_ticks * (self.board.TICK_US // 1000)
-            self.log.add(self.ticks, faults.HOST_SILENT, faults.BOARD, ms)
-            if self.safety.mode == HOLDING:
-                self.bubbles.hold_position()
-            else:
-                self.bubbles.retract()
-
-    def _found(self, found):
-        bubbles = self.bubbles
-        for i in range(bubbles.count):
-            new = self.fault_monitor.take_new_faults(i)
-            bit = 1
-            while new:
-                if new & 1:
-                    self._fault_ids[i] = self.log.add(self.ticks, bit, i, bubbles.pressure_pa(i))
-                new >>= 1
-                bit <<= 1
-        if found & _OVERFILLED_BUBBLE:
-            self._alarm(OVERFILLED)
-
-    def fault(self, bits):
-        """The board has these faults: those that are new are latched and written down."""
-        new = bits & ~self.faults
-        self.faults |= bits
-        bit = 1
-        while new:
-            if new & 1:
-                self._fault_id = self.log.add(self.ticks, bit, faults.BOARD, self.supply.pressure_pa)
-            new >>= 1
-            bit <<= 1
-
-    def _test(self):
-        if self.self_test.running:
-            self.self_test.tick(self.bubbles, self.supply)
-        if not self.self_test.running:
-            if self.self_test.failed:
-                self.fault(SELF_TEST)
-            self.safety.handle(state.TESTED)
-
-    def show(self, values, first, over_ms):
-        """Take the shape whose heights (µm) stand in `values[first:]`, in `over_ms`."""
-        self.self_test.skip()
-        self.player.cancel()
-        self.safety.handle(state.SHOW)
-        if self.safety.mode == ACTIVE:
-            ticks = over_ms * 1000 // self.board.TICK_US
-            self.bubbles.set_targets(values, first, ticks if ticks > 1 else 1)
-
-    def stop(self):
-        """Close all valves and keep the air, unless a fault of the board keeps the vents open."""
-        self.self_test.skip()
-        self.player.cancel()
-        self.safety.handle(state.STOP)
-        if self.safety.mode == HOLDING:
-            self.bubbles.hold_position()
-
-    def vent(self):
-        """Open all vent valves until the next `show`."""
-        self.player.cancel()
-        self.safety.handle(state.VENT)
-        self.bubbles.retract()
-
-    def clear(self):
-        """Acknowledge all faults: forget them; what still is wrong faults again."""
-        self.acknowledge(self.log.newest)
-
-    def acknowledge(self, up_to):
-        """Acknowledge the log up to this entry, and forget what has no later one; what still is wrong faults again."""
-        self.log.acknowledge(up_to)
-        for i in range(self.bubbles.count):
-            if self._fault_ids[i] <= up_to:
-                self.bubbles.clear_faults(i)
-                self.fault_monitor.acknowledge(i)
-        if self._fault_id <= up_to:
-            self.faults = 0
-            self.supply.clear()
-            self.hands.clear()
-            self.safety.handle(state.CLEAR)
-            if self.hands.alarms & ESTOP:  # still pressed
-                self._alarm(ESTOP)
-
-    def heard(self):
-        """A valid frame of the host's has come: it lives."""
-        self.deadman.host_activity()
-
-    def use_settings(self):
-        """The settings have changed."""
-        values = self.settings.values
-        self.deadman.configure(values[settings.DEADMAN_HOLD], values[settings.DEADMAN_VENT])
-        self.fault_monitor.set_budget(values[settings.BUDGET_KPA_S])
-
-    def restart(self, into):
-        """Vent and start again."""
-        self.vent()
-        self.hands.vent()
-        self.hands.restart(into)
+    def _fail(self) -> None:
+        self.stats.exceptions += 1
+        self.commands.fail()
 
 
-def run(app):
-    """Tick for as long as the hands' clock does."""
+def run(app: App) -> None:
+    """Tick for as long as the board's clock does."""
     while True:
-        periods = app.hands.wait()
+        periods = app.hal.wait()
         if periods > 0:
-            app.ticks = later(app.ticks, periods - 1)
+            app.clock.advance(periods - 1)
             app.tick()
         elif periods:
             app.listen()

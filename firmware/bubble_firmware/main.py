@@ -3,21 +3,25 @@
 import gc
 
 from bubble_firmware.app import App, run
+from bubble_protocol.mpy_compat import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 
-def lockstep(board, boot_id):
+def lockstep(board: "ModuleType", boot_id: int) -> None:
     """Run the firmware of `board` against a plant at the other end of stdin and stdout."""
-    from bubble_firmware.hal.lockstep import Hands
+    from bubble_firmware.hal.lockstep import LockstepHal
 
-    hands = Hands(board.BUBBLES, boot_id)
-    while not hands.ended:
-        run(App(board, hands))
+    hal = LockstepHal(board, boot_id)
+    while not hal.ended:
+        run(App(board, hal))
         gc.collect()
 
 
-def pico(board):
+def pico(board: "ModuleType") -> None:
     """Run the firmware of `board` on the Raspberry Pi Pico that this is."""
-    from bubble_firmware.hal.pico import Hands
+    from bubble_firmware.hal.pico import PicoHal
 
-    hands = Hands(board)  # first of all: it makes the outputs safe
-    run(App(board, hands))
+    hal = PicoHal(board)  # first of all: it makes the outputs safe
+    run(App(board, hal))

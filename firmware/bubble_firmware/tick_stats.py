@@ -1,32 +1,45 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
-"""How long ticks take and how late they begin: counts in bins, made once."""
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
+"""How long ticks take and how late they begin."""
 
 from array import array
 
-from bubble_protocol.mpy_compat import const, micropython, ptr32
-from bubble_protocol.schema.system import TICKS_WRAP
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr32
 
-LATEST = TICKS_WRAP - 1
+if TYPE_CHECKING:
+    from types import ModuleType
 
-BINS = 24
-_LAST = const(23)
+BINS = const(24)
 
 
 @micropython.viper
-def count(counts: ptr32, us: int, width: int):
+def _count(counts: ptr32, us: int, width: int):
     """Count one time in bins of `width` µs; the last bin also takes everything longer."""
     index = us // width
-    if index > _LAST:
-        index = _LAST
+    if index > BINS - 1:
+        index = BINS - 1
     counts[index] = counts[index] + 1
 
 
-def bins():
-    """Empty bins."""
-    return array("i", bytearray(4 * BINS))
+class TickStats:
+    """Histograms since boot, made once: `worked` in bins of `work_us`, `delayed` in bins of `delay_us`, BINS each.
 
+    `worst_us`: the longest tick. `exceptions`: how many ticks have failed.
+    """
 
-def later(ticks, periods):
-    """The device time some periods after `ticks`: it goes on from 0 before an integer would become long."""
-    over = ticks - (LATEST - periods)  # LATEST - ticks would be long before the first tick, when ticks are -1
-    return ticks + periods if over <= 0 else over - 1
+    def __init__(self, board: "ModuleType"):
+        self.work_us = board.TICK_US // 50
+        self.delay_us = board.TICK_US // 250
+        self.worked = array("i", bytearray(4 * BINS))
+        self.delayed = array("i", bytearray(4 * BINS))
+        self.worst_us = 0
+        self.exceptions = 0
+
+    def began(self, us: int) -> None:
+        """A tick has begun so many µs after its period."""
+        _count(self.delayed, us, self.delay_us)
+
+    def ended(self, us: int) -> None:
+        """A tick has ended so many µs after its period began."""
+        _count(self.worked, us, self.work_us)
+        if us > self.worst_us:
+            self.worst_us = us

@@ -1,18 +1,23 @@
+# mypy: disable-error-code="no-untyped-def,no-redef"
 """CRC-32 (IEEE 802.3, as in zlib) written straight into a buffer.
 
 MicroPython's `binascii.crc32` returns a long integer for three values in four, and a long integer is an
 allocation. The tick must not allocate, so the device runs this instead; the host passes a function of
 the same shape that calls crcmod. The tests hold crcmod, zlib, binascii and this against each other.
+On CPython, where a loop over bytes is slow, the same functions are zlib's.
 """
 
 from array import array
 
-from bubble_protocol.mpy_compat import micropython, ptr8, ptr32
+from bubble_protocol.mpy_compat import COMPILED, TYPE_CHECKING, micropython, ptr8, ptr32
+
+if TYPE_CHECKING:
+    from bubble_protocol.mpy_compat import Buffer
 
 _POLYNOMIAL_LOW, _POLYNOMIAL_HIGH = 0x8320, 0xEDB8  # 0xEDB88320, bits reversed
 
 
-def _table():
+def _table() -> "array[int]":
     """The 256 remainders, as signed words: viper has no unsigned ones."""
     table = array("i", bytearray(4 * 256))
     for byte in range(256):
@@ -28,7 +33,7 @@ def _table():
     return table
 
 
-_TABLE = _table()
+TABLE = _table()
 
 
 @micropython.viper
@@ -48,9 +53,9 @@ def _crc32_into(table, buffer, start: int, end: int, out, at: int):
     result[at + 3] = crc >> 24 & 255
 
 
-def crc32_into(buffer, start, end, out, at):
+def crc32_into(buffer: "Buffer", start: int, end: int, out: bytearray, at: int) -> None:
     """Write the CRC-32 of `buffer[start:end]` to `out[at:at + 4]`, low byte first. Allocates nothing."""
-    _crc32_into(_TABLE, buffer, start, end, out, at)
+    _crc32_into(TABLE, buffer, start, end, out, at)
 
 
 @micropython.viper
@@ -65,12 +70,25 @@ def _crc32_on(table, buffer, start: int, end: int, word):
     state[0] = ~crc
 
 
-def crc32_on(buffer, start, end, word):
+def crc32_on(buffer: "Buffer", start: int, end: int, word: "array[int]") -> None:
     """Go on with the CRC-32 in `word[0]`, of an `array('i')`, over `buffer[start:end]`; it begins at 0. Allocates nothing."""
-    _crc32_on(_TABLE, buffer, start, end, word)
+    _crc32_on(TABLE, buffer, start, end, word)
 
 
-def crc32_word(buffer, start, end):
+if not COMPILED:
+    import zlib
+
+    def crc32_into(buffer: "Buffer", start: int, end: int, out: bytearray, at: int) -> None:
+        """As above."""
+        out[at : at + 4] = zlib.crc32(memoryview(buffer)[start:end]).to_bytes(4, "little")
+
+    def crc32_on(buffer: "Buffer", start: int, end: int, word: "array[int]") -> None:
+        """As above."""
+        crc = zlib.crc32(memoryview(buffer)[start:end], word[0] & 0xFFFFFFFF)
+        word[0] = crc - (crc >> 31 << 32)
+
+
+def crc32_word(buffer: "Buffer", start: int, end: int) -> int:
     """The same CRC as one signed word, the way `array('i')` holds it."""
     crc = bytearray(4)
     crc32_into(buffer, start, end, crc, 0)

@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def,no-redef"
 """Frames on the wire: COBS around (id, sequence number, payload, CRC-32), one 0x00 after each.
 
     | 1      | 1  | 2        | 0..247  | 4      | 1    |
@@ -14,7 +14,15 @@ Nothing here allocates once made, reads a clock or does I/O. `crc32_into(buffer,
 the caller's: crcmod on the host, `bubble_protocol.crc` on the device.
 """
 
-from bubble_protocol.mpy_compat import COMPILED, const, micropython, ptr8
+from bubble_protocol.buffers import copy
+from bubble_protocol.mpy_compat import COMPILED, TYPE_CHECKING, const, micropython, ptr8
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bubble_protocol.mpy_compat import Buffer
+
+    Crc = Callable[[bytearray, int, int, bytearray, int], None]
 
 HEADER = 3  # id, sequence number
 CRC = 4
@@ -26,17 +34,19 @@ OVERHEAD = FRAME_MAX - PAYLOAD_MAX
 NO_KEY = bytes(CRC)
 
 _ZERO = b"\x00"
-_HELLO = const(0x01)
-_HELLO_REPLY = const(0x81)
-_ERROR = const(0x7F)
+# [constants] bubble_protocol.schema.messages: HELLO ERROR REPLY
+_HELLO = const(1)
+_ERROR = const(127)
+_REPLY = const(128)
+# [end of constants]
 _SHORTEST = 1 + HEADER + CRC  # without the delimiter
 
 
 @micropython.viper
-def _mix(frame: ptr8, end: int, key: ptr8):
-    """Mix the key into the CRC before `end`, where the frame has one; a zero at `end`."""
-    what = frame[1]
-    if not (what == _HELLO or what == _HELLO_REPLY or (what == _ERROR and frame[4] == _HELLO)):
+def _apply_key(frame: ptr8, end: int, key: ptr8):
+    """XOR the key into the CRC before `end`, unless the frame is about HELLO; put a zero at `end`."""
+    message_id = frame[1]
+    if not (message_id == _HELLO or message_id == (_HELLO | _REPLY) or (message_id == _ERROR and frame[4] == _HELLO)):
         frame[end - 4] ^= key[0]
         frame[end - 3] ^= key[1]
         frame[end - 2] ^= key[2]
@@ -45,7 +55,7 @@ def _mix(frame: ptr8, end: int, key: ptr8):
 
 
 @micropython.viper
-def _stuff(frame: ptr8, end: int):
+def _cobs_encode(frame: ptr8, end: int):
     """Put the distance to the next zero in place of every zero of `frame[0:end]`; one stands at `end`."""
     at = 0
     i = 1
@@ -57,7 +67,7 @@ def _stuff(frame: ptr8, end: int):
 
 
 @micropython.viper
-def _unstuff(frame: ptr8, used: int) -> int:
+def _cobs_decode(frame: ptr8, used: int) -> int:
     """Walk from zero to zero and put them back; whether the walk ends where the frame does."""
     at = 0
     while at < used:
@@ -68,10 +78,10 @@ def _unstuff(frame: ptr8, used: int) -> int:
 
 
 @micropython.viper
-def _matches(frame: ptr8, at: int, crc: ptr8, key: ptr8) -> int:
-    """Whether `crc`, with the key where there is one, stands at `frame[at:]`."""
-    what = frame[1]
-    if what == _HELLO or what == _HELLO_REPLY or (what == _ERROR and frame[4] == _HELLO):
+def _has_crc(frame: ptr8, at: int, crc: ptr8, key: ptr8) -> int:
+    """Whether `crc` stands at `frame[at:]`, XORed with the key unless the frame is about HELLO."""
+    message_id = frame[1]
+    if message_id == _HELLO or message_id == (_HELLO | _REPLY) or (message_id == _ERROR and frame[4] == _HELLO):
         i = 0
         while i < 4:
             if frame[at + i] != crc[i]:
@@ -86,39 +96,26 @@ def _matches(frame: ptr8, at: int, crc: ptr8, key: ptr8) -> int:
     return 1
 
 
-@micropython.viper
-def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
-    """`target[at:] = source[start:end]`, without slices."""
-    while start < end:
-        target[at] = source[start]
-        at += 1
-        start += 1
-
-
-if not COMPILED:  # CPython loops over bytes slowly, but splits, joins and slices in C
+if not COMPILED:  # CPython loops over bytes slowly, but splits and joins in C
     _DISTANCES = [bytes((distance,)) for distance in range(1, 256)]
 
-    def _stuff(frame, end):
+    def _cobs_encode(frame: bytearray, end: int) -> None:
         frame[:end] = b"".join([_DISTANCES[len(run)] + run for run in frame[1:end].split(_ZERO)])
 
-    def copy(source, start, end, target, at):
-        """As above."""
-        target[at : at + end - start] = source[start:end]
 
-
-def finish_frame(frame, length, crc32_into, key=NO_KEY):
+def finish_frame(frame: bytearray, length: int, crc32_into: "Crc", key: "Buffer" = NO_KEY) -> int:
     """Finish the frame whose id, sequence number and payload stand at `frame[1:1 + length]`.
 
     `frame` is a bytearray of FRAME_MAX bytes. Returns the length of the finished frame, delimiter included.
     """
     end = 1 + length + CRC
     crc32_into(frame, 1, 1 + length, frame, 1 + length)
-    _mix(frame, end, key)
-    _stuff(frame, end)
+    _apply_key(frame, end, key)
+    _cobs_encode(frame, end)
     return end + 1
 
 
-def put_header(frame, message_id, sequence):
+def put_header(frame: bytearray, message_id: int, sequence: int) -> None:
     """Write id and sequence number where `finish_frame` expects them."""
     frame[1] = message_id
     frame[2] = sequence & 255
@@ -136,7 +133,7 @@ class Decoder:
 
     PAYLOAD_AT = 1 + HEADER
 
-    def __init__(self, crc32_into, key=NO_KEY):
+    def __init__(self, crc32_into: "Crc", key: "Buffer" = NO_KEY):
         self.key = key
         self.frame = bytearray(FRAME_MAX)
         self.length = 0
@@ -147,20 +144,20 @@ class Decoder:
         self._crc32_into = crc32_into
 
     @property
-    def message_id(self):
+    def message_id(self) -> int:
         """The id of the frame just completed."""
         return self.frame[1]
 
     @property
-    def sequence(self):
+    def sequence(self) -> int:
         """The sequence number of the frame just completed."""
         return self.frame[2] | self.frame[3] << 8
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget a frame begun, as after a reconnect."""
         self.length = self._used = 0
 
-    def feed(self, data, start, end):
+    def feed(self, data: "bytes | bytearray", start: int, end: int) -> int:
         """Take bytes of `data[start:end]` (bytes or bytearray) up to the end of one frame; returns the index after them."""
         self.length = 0
         stop = data.find(_ZERO, start, end)
@@ -183,13 +180,13 @@ class Decoder:
                 self.bad += 1
         return stop + 1
 
-    def _is_good(self, used):
+    def _is_good(self, used: int) -> bool:
         if used < _SHORTEST or used >= FRAME_MAX:
             return False
         frame = self.frame
-        if not _unstuff(frame, used):
+        if not _cobs_decode(frame, used):
             return False
         crc = self._crc
         crc_at = used - CRC
         self._crc32_into(frame, 1, crc_at, crc, 0)
-        return _matches(frame, crc_at, crc, self.key)
+        return bool(_has_crc(frame, crc_at, crc, self.key))

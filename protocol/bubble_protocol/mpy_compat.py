@@ -4,10 +4,22 @@ On MicroPython the compiler itself knows `@micropython.viper`, `const` and the p
 here only have to exist. On CPython a viper function is an ordinary function and a pointer cast is a view
 of the same memory, so it computes the same integers as long as nothing overflows 32 bits; storing an
 overflow in an `array('i')` raises there, which is how the tests would find it.
+
+MicroPython has no `typing` either. It compiles annotations of functions away without looking at them, so device files
+have them like any others; a name that only they need is imported under `TYPE_CHECKING`, and then stands in quotes.
 """
 
 import gc
 from array import array
+
+TYPE_CHECKING = False  # as in `typing`: a type checker takes it for true
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    Buffer = bytes | bytearray | memoryview
+    Words = array[int] | memoryview[int]
 
 try:
     import micropython
@@ -16,7 +28,7 @@ try:
     ptr8 = ptr16 = ptr32 = uint = None
     COMPILED = True
 
-    def heap_free():
+    def heap_free() -> int:
         """Free bytes of the garbage collected heap."""
         return gc.mem_free()  # type: ignore[attr-defined]
 
@@ -27,7 +39,7 @@ except ImportError:
         """The decorators that the device's compiler knows, as plain functions."""
 
         @staticmethod
-        def viper(function):
+        def viper(function: "Callable[..., Any]") -> "Callable[..., Any]":
             """Leave the function as it is, but for casting the arguments that are annotated as pointers to half words."""
             code = function.__code__
             casts = []
@@ -37,24 +49,24 @@ except ImportError:
             if not any(casts):
                 return function
 
-            def called(*arguments):
+            def called(*arguments: "Any") -> "Any":
                 return function(*[cast(a) if cast else a for cast, a in zip(casts, arguments, strict=True)])
 
             return called
 
-    def const(value):
+    def const(value: int) -> int:
         """Leave the value as it is."""
         return value
 
-    def ptr8(buffer):
+    def ptr8(buffer: "Any") -> "Any":
         """The buffer as unsigned bytes."""
         return buffer
 
-    def ptr16(buffer):
+    def ptr16(buffer: "Any") -> "Any":
         """The buffer as unsigned 16-bit words."""
         return memoryview(buffer).cast("B").cast("H")
 
-    def ptr32(buffer):
+    def ptr32(buffer: "Any") -> "Any":
         """An `array('i')`, or a pointer further on in one, as signed 32-bit words."""
         return buffer
 
@@ -63,17 +75,17 @@ except ImportError:
 
         __slots__ = ("words",)
 
-        def __init__(self, words):
+        def __init__(self, words: "Words"):
             self.words = words
 
-        def __add__(self, size):
+        def __add__(self, size: int) -> memoryview:
             words = self.words
             return (memoryview(words) if isinstance(words, array) else words)[size >> 2 :]
 
-    def uint(pointer):
+    def uint(pointer: "Words") -> _Address:
         """The address in a pointer."""
         return _Address(pointer)
 
-    def heap_free():
+    def heap_free() -> int:
         """Free bytes of the heap: 0, CPython's heap has no fixed size."""
         return 0

@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """Steps of a sequence on the wire and in the device's memory: records of 16-bit words, and what makes one sound.
 
 | word | of a step | of a repeat |
@@ -13,78 +13,62 @@ A repeat stands before the records that it repeats and an end after them: there 
 nested cannot go round for ever without time passing. All of it runs on host and device.
 """
 
-from bubble_protocol.crc import _TABLE
-from bubble_protocol.mpy_compat import const, micropython, ptr32
+from bubble_protocol.crc import TABLE
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr32
 
-STEP, REPEAT, END = range(3)
-LINEAR, SMOOTH, IN, OUT = range(4)
-TIME, SETTLE = range(2)
-GO_ON, HOLD, VENT, STOP = range(4)
+if TYPE_CHECKING:
+    from bubble_protocol.mpy_compat import Words
 
-HEAD = 4  # words before the targets
-LEAVE = 0xFFFF
-MS_MAX = 60000
-TOLERANCE_MIN_UM = 50
-TOLERANCE_MAX_UM = 5000
-DEPTH_MAX = 4  # repeats within repeats
+# Whole numbers as `const`, each by itself: viper takes those of its own file.
+STEP = const(0)  # kinds of records
+REPEAT = const(1)
+END = const(2)
+LINEAR, SMOOTH, IN, OUT = range(4)  # easings
+TIME, SETTLE = range(2)  # until
+GO_ON, HOLD, VENT, STOP = range(4)  # then
 
-LOOP = 255  # in place of a word's number: the nesting is wrong
+HEAD = const(4)  # words before the targets
+LEAVE = const(0xFFFF)
+MS_MAX = const(60000)
+TOLERANCE_MIN_UM = const(50)
+TOLERANCE_MAX_UM = const(5000)
+DEPTH_MAX = const(4)  # repeats within repeats
+FLAGS_MAX = const(127)
 
-# What `first_flaw` works on.
-BUBBLES = 0
-HEIGHT_MAX = 1  # µm
-TICK_US = 2
-NESTS = 3  # whether repeats are allowed
-DEPTH = 4  # after the records found sound so far
-OPENED = 5  # whether the last of them was a repeat
-DEPTH_NEXT = 6  # the same after the records just looked at; `accept` makes them so
-OPENED_NEXT = 7
-ASKED = 8  # of the flaw
-LOW = 9
-HIGH = 10
-CRC = 11  # of all words accepted
-CHECK = 12
+LOOP = const(255)  # in place of a word's number: the nesting is wrong
 
-# The same for viper, whose constants must be of this file.
-_HEAD = const(4)
-_LEAVE = const(0xFFFF)
-_MS_MAX = const(60000)
-_TOLERANCE_MIN = const(50)
-_TOLERANCE_MAX = const(5000)
-_DEPTH_MAX = const(4)
-_LOOP = const(255)
-_BUBBLES = const(0)
-_HEIGHT_MAX = const(1)
-_TICK_US = const(2)
-_NESTS = const(3)
-_DEPTH = const(4)
-_OPENED = const(5)
-_DEPTH_NEXT = const(6)
-_OPENED_NEXT = const(7)
-_ASKED = const(8)
-_LOW = const(9)
-_HIGH = const(10)
-_STEP = const(0)
-_REPEAT = const(1)
-_END = const(2)
-_FLAGS_MAX = const(127)
-_CRC = const(11)
+# What `first_invalid` works on, an array of CHECK integers.
+BUBBLES = const(0)
+HEIGHT_MAX = const(1)  # µm
+TICK_US = const(2)
+NESTS = const(3)  # whether repeats are allowed
+DEPTH = const(4)  # after the records found sound so far
+OPENED = const(5)  # whether the last of them was a repeat
+DEPTH_NEXT = const(6)  # the same after the records just looked at; `accept` makes them so
+OPENED_NEXT = const(7)
+ASKED = const(8)  # of what is not sound
+LOW = const(9)
+HIGH = const(10)
+CRC = const(11)  # of all words accepted
+CHECK = const(12)
+
+ONE = const(32768)  # the whole way of a ramp
 
 
-def flags(easing, until, then):
+def flags(easing: int, until: int, then: int) -> int:
     """Word 0 of a step."""
     return STEP | easing << 2 | until << 4 | then << 5
 
 
 @micropython.viper
-def first_flaw(v: ptr32, c: ptr32, at: int, records: int) -> int:
+def first_invalid(v: ptr32, c: ptr32, at: int, records: int) -> int:
     """Look at the records from `v[at]` on: record * 256 + word of the first that is not sound, -1 where all are.
 
     `c` is an array of CHECK integers; what was asked and what is allowed stands in its ASKED, LOW and HIGH.
     """
-    n = c[_BUBBLES]
-    depth = c[_DEPTH]
-    opened = c[_OPENED]
+    n = c[BUBBLES]
+    depth = c[DEPTH]
+    opened = c[OPENED]
     record = 0
     while record < records:
         flag = v[at]
@@ -93,87 +77,87 @@ def first_flaw(v: ptr32, c: ptr32, at: int, records: int) -> int:
         asked = 0
         low = 0
         high = 0
-        if kind == _STEP:
+        if kind == STEP:
             settle = flag >> 4 & 1
             ms = v[at + 1] + v[at + 2]
-            least = (c[_TICK_US] + 999) // 1000  # a step takes a tick at least
+            least = (c[TICK_US] + 999) // 1000  # a step takes a tick at least
             i = 0
             while i < n and wrong < 0:
-                if v[at + _HEAD + i] > c[_HEIGHT_MAX] and v[at + _HEAD + i] != _LEAVE:
-                    wrong = _HEAD + i
-                    high = c[_HEIGHT_MAX]
+                if v[at + HEAD + i] > c[HEIGHT_MAX] and v[at + HEAD + i] != LEAVE:
+                    wrong = HEAD + i
+                    high = c[HEIGHT_MAX]
                 i += 1
             if settle:
-                if v[at + 3] < _TOLERANCE_MIN or v[at + 3] > _TOLERANCE_MAX:
+                if v[at + 3] < TOLERANCE_MIN_UM or v[at + 3] > TOLERANCE_MAX_UM:
                     wrong = 3
-                    low = _TOLERANCE_MIN
-                    high = _TOLERANCE_MAX
+                    low = TOLERANCE_MIN_UM
+                    high = TOLERANCE_MAX_UM
             elif v[at + 3]:
                 wrong = 3
                 high = 0
             if ms < least:
                 wrong = 2
                 low = least - v[at + 1]
-                high = _MS_MAX
-            if v[at + 2] > _MS_MAX:
+                high = MS_MAX
+            if v[at + 2] > MS_MAX:
                 wrong = 2
                 low = 0
-                high = _MS_MAX
-            if v[at + 1] > _MS_MAX:
+                high = MS_MAX
+            if v[at + 1] > MS_MAX:
                 wrong = 1
                 low = 0
-                high = _MS_MAX
-            if flag > _FLAGS_MAX or (settle == 0 and flag >> 5):
+                high = MS_MAX
+            if flag > FLAGS_MAX or (settle == 0 and flag >> 5):
                 wrong = 0
                 low = 0
-                high = _FLAGS_MAX
+                high = FLAGS_MAX
             if wrong >= 0:
                 asked = v[at + wrong]
             opened = 0
         else:
-            if kind == _REPEAT:
+            if kind == REPEAT:
                 depth += 1
             else:
                 depth -= 1
-            if flag > _END:
+            if flag > END:
                 wrong = 0
                 asked = flag
-                high = _FLAGS_MAX
-            elif depth < 0 or depth > _DEPTH_MAX or c[_NESTS] == 0 or (kind == _END and opened):
-                wrong = _LOOP
+                high = FLAGS_MAX
+            elif depth < 0 or depth > DEPTH_MAX or c[NESTS] == 0 or (kind == END and opened):
+                wrong = LOOP
                 asked = depth
-                high = _DEPTH_MAX if c[_NESTS] else 0
-            opened = 1 if kind == _REPEAT else 0
+                high = DEPTH_MAX if c[NESTS] else 0
+            opened = 1 if kind == REPEAT else 0
         if wrong >= 0:
-            c[_ASKED] = asked
-            c[_LOW] = low
-            c[_HIGH] = high
+            c[ASKED] = asked
+            c[LOW] = low
+            c[HIGH] = high
             return record * 256 + wrong
-        at += _HEAD + n
+        at += HEAD + n
         record += 1
-    c[_DEPTH_NEXT] = depth
-    c[_OPENED_NEXT] = opened
+    c[DEPTH_NEXT] = depth
+    c[OPENED_NEXT] = opened
     return -1
 
 
 @micropython.viper
 def _accept(v: ptr32, c: ptr32, t: ptr32, at: int, end: int):
-    crc = c[_CRC]
+    crc = c[CRC]
     while at < end:
         crc = (crc >> 8 & 0xFFFFFF) ^ t[(crc ^ v[at]) & 255]
         crc = (crc >> 8 & 0xFFFFFF) ^ t[(crc ^ v[at] >> 8) & 255]
         at += 1
-    c[_CRC] = crc
-    c[_DEPTH] = c[_DEPTH_NEXT]
-    c[_OPENED] = c[_OPENED_NEXT]
+    c[CRC] = crc
+    c[DEPTH] = c[DEPTH_NEXT]
+    c[OPENED] = c[OPENED_NEXT]
 
 
-def accept(words, check, at, end):
+def accept(words: "Words", check: "Words", at: int, end: int) -> None:
     """Take the records at `words[at:end]`, just found sound, as received: nesting and CRC go on from there."""
-    _accept(words, check, _TABLE, at, end)
+    _accept(words, check, TABLE, at, end)
 
 
-def restart(check, nests):
+def restart(check: "Words", nests: int) -> None:
     """No record has been received yet."""
     check[NESTS] = nests
     check[DEPTH] = 0
@@ -184,23 +168,23 @@ def restart(check, nests):
 @micropython.viper
 def has_crc(c: ptr32, v: ptr32, at: int) -> int:
     """Whether `v[at]` is the CRC-32 of all words accepted, low byte first."""
-    return 1 if ~c[_CRC] == v[at] else 0
+    return 1 if ~c[CRC] == v[at] else 0
 
 
 @micropython.viper
-def same(a: ptr32, at: int, b: ptr32, bt: int) -> int:
+def same_word(a: ptr32, at: int, b: ptr32, bt: int) -> int:
     """Whether two words are the same; read as integers of MicroPython they could be an allocation."""
     return 1 if a[at] == b[bt] else 0
 
 
 @micropython.viper
-def keep(a: ptr32, at: int, b: ptr32, bt: int):
+def copy_word(a: ptr32, at: int, b: ptr32, bt: int):
     """Copy one word, whatever its size."""
     b[bt] = a[at]
 
 
 @micropython.viper
-def small(v: ptr32, at: int) -> int:
+def small_word(v: ptr32, at: int) -> int:
     """An unsigned word as a small integer; what is none becomes the greatest."""
     word = v[at]
     return 0x3FFFFFFF if word < 0 or word > 0x3FFFFFFF else word

@@ -1,7 +1,7 @@
 """An exception inside the tick, on the chip: the real drivers, with one that raises while a free pin is high.
 
 The firmware has no switch for this. The prompt of the BARE firmware starts the frozen application by hand, with
-`hands.sense` wrapped, as a driver that fails would look.
+`read_sensors` wrapped, as a driver that fails would look.
 """
 
 import numpy as np
@@ -25,17 +25,17 @@ micropython.kbd_intr(-1)
 from machine import Pin
 from bubble_firmware import boards
 from bubble_firmware.app import App, run
-from bubble_firmware.hal.pico import Hands
+from bubble_firmware.hal.pico import PicoHal
 board = boards.load("wristband7")
-hands = Hands(board)
+hal = PicoHal(board)
 spare = Pin({pin}, Pin.IN)
-sense = hands.sense
+read_sensors = hal.read_sensors
 def failing(counts):
     if spare():
         raise OSError(5)
-    sense(counts)
-hands.sense = failing
-app = App(board, hands)
+    read_sensors(counts)
+hal.read_sensors = failing
+app = App(board, hal)
 run(app)
 """
 

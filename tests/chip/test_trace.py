@@ -1,6 +1,6 @@
 """One recorded trace, three interpreters: CPython, MicroPython's unix port and the RP2040 give the same commands.
 
-What runs is the whole firmware but for its hands: sensor counts and bytes of the link of every tick are those of
+What runs is the whole firmware but for its hardware: sensor counts and bytes of the link of every tick are those of
 a recording, and of its outputs only a checksum is kept. On the RP2040 it is the frozen code of the UF2.
 """
 
@@ -24,37 +24,36 @@ REPLAY = """
 import binascii
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_firmware.hal.lockstep import Hands
+from bubble_firmware.hal.base import Hal
 
-class Replay(Hands):
-    def __init__(self):
-        self.boot_id = 1
-        self.sum = self._phase_us = 0
+class Replay(Hal):
+    def __init__(self, board):
+        super().__init__(board)
+        self.sum = 0
         self.counts = self.link = b""
-    def sense(self, counts):
+    def read_sensors(self, counts):
         for i in range(len(counts)):
             counts[i] = self.counts[2 * i] | self.counts[2 * i + 1] << 8
-    def act(self, pulses, pump, dump):
+    def write_outputs(self, pulses, pump, dump):
         self.sum = binascii.crc32(bytes((pump & 255, pump >> 8, 1 if dump else 0)), binascii.crc32(pulses))
-    def vent(self):
+    def safe_outputs(self):
         self.sum = 0
     def receive(self, buffer):
         for i in range(len(self.link)):
             buffer[i] = self.link[i]
         return len(self.link)
-    def send(self, frame, length):
-        return True
 
-hands = Replay()
-app = App(boards.load({board!r}), hands)
+board = boards.load({board!r})
+hal = Replay(board)
+app = App(board, hal)
 
 def replay(ticks):
     sums = []
     for counts, link in ticks:
-        hands.counts = binascii.unhexlify(counts)
-        hands.link = binascii.unhexlify(link)
+        hal.counts = binascii.unhexlify(counts)
+        hal.link = binascii.unhexlify(link)
         app.tick()
-        sums.append("%08x" % hands.sum)
+        sums.append("%08x" % hal.sum)
     print(" ".join(sums))
 """
 

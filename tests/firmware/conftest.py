@@ -1,4 +1,4 @@
-"""The firmware in this interpreter, on hands that follow a test's script."""
+"""The firmware in this interpreter, on hardware that follows a test's script."""
 
 import struct
 import zlib
@@ -9,6 +9,7 @@ import pytest
 from bubble_firmware import boards
 from bubble_firmware.app import App
 from bubble_firmware.control.state_layout import ROW_WORDS, SETPOINT
+from bubble_firmware.hal.base import Hal
 from bubble_protocol import codec, steps
 from bubble_protocol.schema import messages
 from bubble_protocol.schema.messages import HELLO, PING
@@ -20,30 +21,13 @@ from bubbleskin.link.reader import Reader
 SESSION = 0x89ABCDEF
 
 
-class Hands:
-    """A board's hands by script: what is sensed is set, what is done is kept, the link is bytes both ways."""
+class ScriptedHal(Hal):
+    """A board by script: what is sensed is set, what is done is kept, the link is bytes both ways."""
 
     boot_id = 0xFEDCBA98
-    late_ticks = 0
-    alarms = boot_faults = 0
-    self_test = False
-
-    def alive(self, mode, faults):
-        pass
-
-    def clear(self):
-        pass
-
-    def slack(self):
-        pass
-
-    def tidy(self):
-        pass
-
-    def restart(self, into):
-        pass
 
     def __init__(self, board):
+        super().__init__(board)
         self.counts = [board.SENSOR_ZERO] * board.BUBBLES + [
             board.SUPPLY_ZERO + board.SUPPLY_PA // board.SUPPLY_PA_PER_COUNT
         ]
@@ -51,28 +35,28 @@ class Hands:
         self.from_device = bytearray()
         self.pulses = None
         self.pump = self.dump = None
-        self.in_vent = False
+        self.safe = False  # whether the outputs are
         self.noise = 0
         self.full = False  # no room for what is sent
-        self.broken = set()  # names of hands that raise
+        self.broken = set()  # names of methods that raise
 
     def _use(self, name):
         if name in self.broken:
             raise OSError(f"{name} is broken")
 
-    def sense(self, counts):
+    def read_sensors(self, counts):
         """A sensor has noise: now and then a count more, where that is none of the ends."""
-        self._use("sense")
+        self._use("read_sensors")
         self.noise = (self.noise + 1) % 8
         more = self.noise == 0
         counts[:] = type(counts)("H", [count + (more and 8 < count < 4000) for count in self.counts])
 
-    def act(self, pulses, pump, dump):
-        self._use("act")
-        self.pulses, self.pump, self.dump, self.in_vent = pulses.tolist(), pump, dump, False
+    def write_outputs(self, pulses, pump, dump):
+        self._use("write_outputs")
+        self.pulses, self.pump, self.dump, self.safe = pulses.tolist(), pump, dump, False
 
-    def vent(self):
-        self.pulses, self.pump, self.dump, self.in_vent = None, 0, False, True
+    def safe_outputs(self):
+        self.pulses, self.pump, self.dump, self.safe = None, 0, False, True
 
     def receive(self, buffer):
         self._use("receive")
@@ -87,27 +71,24 @@ class Hands:
         self.from_device += frame[:length]
         return True
 
-    def phase_us(self):
-        return 0
-
 
 class Rig:
-    """An `App` on such hands."""
+    """An `App` on such hardware."""
 
     def __init__(self, name):
         self.board = boards.load(name)
-        self.hands = Hands(self.board)
-        self.app = App(self.board, self.hands)
+        self.hal = ScriptedHal(self.board)
+        self.app = App(self.board, self.hal)
         self._reader = Reader()
         self._sequence = 0
         self.open(SESSION)
 
     def open(self, session):
         """Open a session, without a tick; the greeting."""
-        self.hands.to_device += wire.encode("HELLO", 0, (PROTOCOL_MIN, PROTOCOL_MAX, session))
-        self.app.session.poll()
+        self.hal.to_device += wire.encode("HELLO", 0, (PROTOCOL_MIN, PROTOCOL_MAX, session))
+        self.app.server.poll()
         self.session = session
-        self.key = wire.session_key(self.hands.boot_id, session)
+        self.key = wire.session_key(self.hal.boot_id, session)
         self._reader.use(self.key)
         self._sequence = 0
         return self.heard()[-1]
@@ -119,13 +100,13 @@ class Rig:
     def tick(self, ticks=1):
         """Let periods pass, with a host that lives."""
         for _ in range(ticks):
-            self.app.heard()
+            self.app.deadman.host_activity()
             self.app.tick()
 
     def heard(self):
         """All messages since the last time."""
-        messages = list(self._reader.feed(bytes(self.hands.from_device)))
-        self.hands.from_device.clear()
+        messages = list(self._reader.feed(bytes(self.hal.from_device)))
+        self.hal.from_device.clear()
         return messages
 
     def next_sequence(self, message_id):
@@ -138,7 +119,7 @@ class Rig:
     def ask(self, name, fixed=(), repeated=()):
         """Send a request, tick once; the one answer."""
         sequence = self.next_sequence(codec.BY_NAME[name].id)
-        self.hands.to_device += self.encode(name, sequence, fixed, repeated)
+        self.hal.to_device += self.encode(name, sequence, fixed, repeated)
         self.heard()
         self.tick()
         (answer,) = self.heard()
@@ -164,11 +145,11 @@ class Rig:
 
     def sense(self, bubble, pascals):
         """What a bubble's sensor reads from now on."""
-        self.hands.counts[bubble] = self.board.SENSOR_ZERO + round(pascals / self.board.SENSOR_PA_PER_COUNT)
+        self.hal.counts[bubble] = self.board.SENSOR_ZERO + round(pascals / self.board.SENSOR_PA_PER_COUNT)
 
     def pulse(self, bubble):
         """(fill, vent) of the coming period, µs."""
-        return tuple(self.hands.pulses[2 * bubble : 2 * bubble + 2])
+        return tuple(self.hal.pulses[2 * bubble : 2 * bubble + 2])
 
     def write_table(self, bubble, knots, part=48):
         """Send a table in parts; the answers."""
@@ -230,7 +211,7 @@ class Sequencer:
     def ask(self, name, *fixed, repeated=()):
         """The answer to a request; events that come with it are kept."""
         rig = self.rig
-        rig.hands.to_device += rig.encode(name, rig.next_sequence(codec.BY_NAME[name].id), fixed, repeated)
+        rig.hal.to_device += rig.encode(name, rig.next_sequence(codec.BY_NAME[name].id), fixed, repeated)
         self.listen()
         rig.app.tick()
         return self.listen()

@@ -218,8 +218,6 @@ def test_nothing_overflows_32_bits(rig7, seed):
             for bubble in range(7):
                 rig7.app.bubbles.clear_faults(bubble)
             for _ in range(12):
-                rig7.hands.counts = [
-                    chance.choice([9, 160, 1500, 2600, 4086, chance.randrange(4096)]) for _ in range(8)
-                ]
+                rig7.hal.counts = [chance.choice([9, 160, 1500, 2600, 4086, chance.randrange(4096)]) for _ in range(8)]
                 rig7.app.tick()
-                assert rig7.app.exceptions == 0, "a word was beyond 32 bits"
+                assert rig7.app.stats.exceptions == 0, "a word was beyond 32 bits"

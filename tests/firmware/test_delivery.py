@@ -17,16 +17,16 @@ SHOW_REPLY = messages.SHOW | messages.REPLY
 def device(rig7):
     """A rig whose `applied` are the heights of every SHOW that was applied, `send(…)` frames and `said()` the answers."""
     rig7.applied = []
-    show = rig7.app.show
+    show = rig7.app.commands.show
 
     def tapped(values, first, over_ms):
         rig7.applied.append(values[first])
         show(values, first, over_ms)
 
-    rig7.app.show = tapped
+    rig7.app.commands.show = tapped
 
     def send(*frames):
-        rig7.hands.to_device += b"".join(frames)
+        rig7.hal.to_device += b"".join(frames)
 
     def said():
         return [
@@ -49,11 +49,11 @@ def applied(*numbers):
 def test_a_request_that_comes_twice_is_applied_once_and_answered_twice(device):
     device.send(show(device, 1))
     device.tick()
-    first = bytes(device.hands.from_device)
+    first = bytes(device.hal.from_device)
     device.heard()
     device.send(show(device, 1), show(device, 1))
     device.tick()
-    assert bytes(device.hands.from_device) == first * 2, "to the byte"
+    assert bytes(device.hal.from_device) == first * 2, "to the byte"
     assert device.applied == applied(1)
 
 
@@ -83,7 +83,7 @@ def test_only_some_are_handled_in_one_tick(device):
 
 
 def test_the_numbers_come_round(device):
-    device.app.session._delivery.expected = 0xFFFD
+    device.app.server.window.expected = 0xFFFD
     for number in (0xFFFE, 0xFFFD, 0, 0xFFFF, 2, 1, 0xFFFD, 0):
         device.send(show(device, number))
         device.tick()
@@ -108,7 +108,7 @@ def test_stop_and_vent_overtake(device, urgent, ahead):
         device.send(show(device, 3))  # it waits for 2
     device.send(device.encode(urgent, number))
     device.tick()
-    assert device.app.mode == {"STOP": modes.HOLDING, "VENT": modes.VENTING}[urgent]
+    assert device.app.safety.mode == {"STOP": modes.HOLDING, "VENT": modes.VENTING}[urgent]
     reply = codec.BY_NAME[urgent].id | messages.REPLY
     assert device.said() == [(1, SHOW_REPLY), (number, reply)]
     skipped = range(2, number)
@@ -125,21 +125,21 @@ def test_what_was_sent_after_a_vent_and_comes_before_it_is_applied_after_it(devi
     device.send(show(device, 3), device.encode("VENT", 2), show(device, 1))
     device.tick(2)
     assert device.applied == applied(3)
-    assert device.app.mode == modes.ACTIVE
+    assert device.app.safety.mode == modes.ACTIVE
     assert dict(device.said())[1] == errors.OVERTAKEN
 
 
 def test_frames_without_the_key_of_boot_and_session_are_none(device):
-    bad = device.app.session._decoder.bad
+    bad = device.app.server.decoder.bad
     for key in (
         b"\0" * 4,
-        session_key(device.hands.boot_id, 5),
-        session_key(device.hands.boot_id ^ 1, device.session),
+        session_key(device.hal.boot_id, 5),
+        session_key(device.hal.boot_id ^ 1, device.session),
     ):
         device.send(encode("VENT", 1, key=key))
     device.tick()
     assert device.said() == []
-    assert device.app.session._decoder.bad == bad + 3
+    assert device.app.server.decoder.bad == bad + 3
 
 
 def test_a_new_session_begins_anew_and_a_late_greeting_does_not_end_it(device):
@@ -196,22 +196,22 @@ def test_a_host_of_protocol_1_is_refused_in_words_it_knows(device):
     frame[4:6] = bytes((1, 1))
     device.send(bytes(frame[: finish_frame(frame, HEADER + 2, crc32_into)]))
     device.tick()
-    (answer,) = Reader().feed(bytes(device.hands.from_device))
+    (answer,) = Reader().feed(bytes(device.hal.from_device))
     assert (answer["error"], answer["low"], answer["high"]) == (errors.NO_COMMON_PROTOCOL, 2, 2)
 
 
 def test_a_reply_that_found_no_room_goes_out_later_in_order_and_before_telemetry(device):
     device.ask("SUBSCRIBE", (5,))
-    device.hands.full = True
+    device.hal.full = True
     for number in (2, 3, 4):
         device.send(show(device, number))
         device.tick()
     device.send(device.encode("VENT", 7))
     device.tick()
-    dropped = device.app.session._telemetry.dropped
+    dropped = device.app.server.telemetry.dropped
     device.tick(5)
-    assert device.app.session._telemetry.dropped == dropped + 1
-    device.hands.full = False
+    assert device.app.server.telemetry.dropped == dropped + 1
+    device.hal.full = False
     device.heard()
     device.tick(5)
     said = device.said()
@@ -220,10 +220,10 @@ def test_a_reply_that_found_no_room_goes_out_later_in_order_and_before_telemetry
     assert device.applied == applied(2, 3, 4)
 
 
-def test_every_frame_of_the_session_is_heard(device):
-    session = device.app.session
-    before = session.heard
+def test_every_frame_of_the_session_is_understood(device):
+    decoder = device.app.server.decoder
+    before = decoder.good
     device.send(device.encode("PING", 9, (1,)), show(device, 1), show(device, 1), show(device, 500))
     device.send(encode("PING", 9, (1,)))
     device.tick()
-    assert session.heard == before + 4
+    assert decoder.good == before + 4

@@ -18,24 +18,19 @@ import gc, sys
 from bubble_firmware import boards
 from bubble_firmware.control import state_layout as layout
 from bubble_firmware.app import App
+from bubble_firmware.hal.base import Hal
 
-class Hands:
-    boot_id = 1
-    late_ticks = 0
-    alarms = boot_faults = 0
-    self_test = False
+class LineHal(Hal):
     line = b""
     answers = 0
     wide = 0
-    def sense(self, counts):
+    def read_sensors(self, counts):
         for i in range(len(counts)):
             counts[i] = 1000 + 200 * i
-    def act(self, pulses, pump, dump):
+    def write_outputs(self, pulses, pump, dump):
         for i in range(len(pulses)):
             if pulses[i] > {tick_us}:
                 self.wide += 1
-    def vent(self):
-        pass
     def receive(self, buffer):
         line = self.line
         size = min(len(line), len(buffer))
@@ -47,35 +42,23 @@ class Hands:
         if frame[1] not in (0x07, 0x1C, 0x26):  # TELEMETRY, TELEMETRY_FIELDS, SEQUENCE_EVENT
             self.answers += 1
         return True
-    def alive(self, mode, faults):
-        pass
-    def tidy(self):
-        pass
-    def slack(self):
-        pass
-    def restart(self, into):
-        pass
-    def clear(self):
-        pass
-    def phase_us(self):
-        return 0
 
-hands = Hands()
 board = boards.load("{board}")
-app = App(board, hands)
+hal = LineHal(board)
+app = App(board, hal)
 rows = app.bubbles.rows
 limit = board.HEIGHT_MAX_UM
 unanswered = beyond = frames = 0
 free = 0
 for line in sys.stdin:
     frame = bytes.fromhex(line.strip())
-    before = hands.answers
-    hands.line = frame
+    before = hal.answers
+    hal.line = frame
     app.tick()
-    while hands.line:
+    while hal.line:
         app.tick()
     frames += 1
-    unanswered += hands.answers != before + 1
+    unanswered += hal.answers != before + 1
     for bubble in range(board.BUBBLES):
         at = bubble * layout.ROW_WORDS
         if not 0 <= rows[at + layout.TARGET] <= limit or rows[at + layout.SETPOINT] > limit << 4:
@@ -88,7 +71,7 @@ for line in sys.stdin:
         app.tick()
 line = frame = None
 gc.collect()
-print(frames, unanswered, beyond, hands.wide, app.exceptions, free - gc.mem_free())
+print(frames, unanswered, beyond, hal.wide, app.stats.exceptions, free - gc.mem_free())
 """
 
 

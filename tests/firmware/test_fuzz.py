@@ -14,19 +14,16 @@ SCRIPT = """
 import gc, random, sys
 from bubble_firmware import boards
 from bubble_firmware.app import App
+from bubble_firmware.hal.base import Hal
 from bubble_protocol import frame as framing
 from bubble_protocol.crc import crc32_into
 
 TELEMETRY = 0x07
 
-class Hands:
+class LineHal(Hal):
     # The link is `line[:length]`, 256 bytes of it in every tick.
-    boot_id = 1
-    late_ticks = 0
-    alarms = boot_faults = 0
-    self_test = False
-
-    def __init__(self):
+    def __init__(self, board):
+        super().__init__(board)
         self.line = bytearray(8192)
         self.length = 0
         self.at = 0
@@ -34,14 +31,11 @@ class Hands:
         self.answered = False  # the good frame
         self.vented = 0
 
-    def sense(self, counts):
+    def read_sensors(self, counts):
         for i in range(len(counts)):
             counts[i] = 1000 + 200 * i
 
-    def act(self, pulses, pump, dump):
-        pass
-
-    def vent(self):
+    def safe_outputs(self):
         self.vented += 1
 
     def receive(self, buffer):
@@ -59,31 +53,16 @@ class Hands:
             self.answers += 1
         return True
 
-    def alive(self, mode, faults):
-        pass
-
-    def tidy(self):
-        pass
-
-    def slack(self):
-        pass
-
     def restart(self, into):
         self.vented -= 1  # a restart vents, as it should
-
-    def clear(self):
-        pass
-
-    def phase_us(self):
-        return 0
 
 
 class Watch:
     # Stands before the dispatcher and asks of every frame accepted whether it was sent.
-    def __init__(self, session, sent):
-        self.handle = session._arrive
-        self.frame = session._decoder.frame
-        self.decoder = session._decoder
+    def __init__(self, server, sent):
+        self.take = server.take
+        self.frame = server.decoder.frame
+        self.decoder = server.decoder
         self.sent = sent
         self.found = bytearray(256)
         self.accepted = 0
@@ -94,21 +73,22 @@ class Watch:
         content = bytes(self.frame[1 : 1 + self.decoder.length])
         if self.sent is not None and content not in self.sent:
             self.forged += 1
-        self.handle(message_id, sequence)
+        self.take(message_id, sequence)
 
 
 rnd = random.getrandbits
-hands = Hands()
-app = App(boards.load("wristband7"), hands)
-session = app.session
-decoder = session._decoder
+board = boards.load("wristband7")
+hal = LineHal(board)
+app = App(board, hal)
+server = app.server
+decoder = server.decoder
 frames = [bytes.fromhex(line) for line in sys.stdin.read().split()]
 greeting = frames.pop(0)
 good = frames[0]
-key = session._delivery.key
+key = server.window.key
 for i in range(len(greeting)):
-    hands.line[i] = greeting[i]
-hands.length = len(greeting)
+    hal.line[i] = greeting[i]
+hal.length = len(greeting)
 app.tick()
 sent = set()
 for frame in frames:
@@ -116,19 +96,19 @@ for frame in frames:
     while at < len(frame):
         at = decoder.feed(frame, at, len(frame))
     sent.add(bytes(decoder.frame[1 : 1 + decoder.length]))
-watch = Watch(session, sent)
-session._arrive = watch
+watch = Watch(server, sent)
+server.take = watch
 
 
 def run(length):
-    hands.length = length
-    hands.at = 0
-    while hands.at < length:
+    hal.length = length
+    hal.at = 0
+    while hal.at < length:
         app.tick()
 
 
 def put(at, data):
-    line = hands.line
+    line = hal.line
     for i in range(len(data)):
         line[at + i] = data[i]
     return at + len(data)
@@ -136,20 +116,20 @@ def put(at, data):
 
 def good_is_understood():
     # A delimiter, then the good frame: answered, and nothing else is.
-    line = hands.line
+    line = hal.line
     line[0] = 0
     end = put(1, good)
     app.tick()
-    answers = hands.answers
+    answers = hal.answers
     was = decoder.good
     run(end)
-    return hands.answers > answers and decoder.good > was
+    return hal.answers > answers and decoder.good > was
 
 
 def random_bytes(total):
     # Even ones, and ones with many delimiters and small COBS steps, which make short frames.
     missed = 0
-    line = hands.line
+    line = hal.line
     while total > 0:
         style = rnd(2)
         for i in range(2000):
@@ -203,7 +183,7 @@ def mutate(work, n):
 
 def mutated(total):
     missed = 0
-    line = hands.line
+    line = hal.line
     work = bytearray(300)
     end = 0
     while total > 0:
@@ -227,12 +207,12 @@ def well_formed(total):
     # Any id, any payload, a right CRC: the dispatcher's turn. Each is answered once.
     watch.sent = None
     frame = bytearray(framing.FRAME_MAX)
-    answers = hands.answers
+    answers = hal.answers
     for turn in range(total):
         size = rnd(5) if rnd(1) else rnd(8) % 248
         if rnd(2) == 0:
             size = {right_size} if rnd(1) else 3 + 4 * rnd(4)
-        framing.put_header(frame, rnd(4) if rnd(3) else rnd(8), session._delivery.expected)
+        framing.put_header(frame, rnd(4) if rnd(3) else rnd(8), server.window.expected)
         few = rnd(1)
         for i in range(size):
             frame[4 + i] = rnd(8) >> (5 if few else 0)
@@ -240,12 +220,12 @@ def well_formed(total):
             for i in range(4):
                 frame[6 + i] = 0xAB if size >= 6 and not few else 0
         end = framing.finish_frame(frame, framing.HEADER + size, crc32_into, key)
-        line = hands.line
+        line = hal.line
         for i in range(end):
             line[i] = frame[i]
         run(end)
     watch.sent = sent
-    return total - (hands.answers - answers)
+    return total - (hal.answers - answers)
 
 
 def main(seed, bytes_, mutations, requests):
@@ -264,7 +244,7 @@ def main(seed, bytes_, mutations, requests):
     print("mutated", mutated(mutations), watch.accepted, decoder.bad - bad)
     print("requests", well_formed(requests), not good_is_understood())
     print("forged", watch.forged)
-    print("exceptions", app.exceptions, hands.vented - 1)
+    print("exceptions", app.stats.exceptions, hal.vented - 1)
     gc.collect()
     print("heap", before, gc.mem_free())
 
@@ -331,13 +311,13 @@ def test_every_well_formed_frame_is_answered_once(rig):
     for _ in range(2000):
         size = chance.choice([*fitting, chance.randrange(248)])
         message_id = chance.choice([chance.randrange(16), chance.randrange(256)])
-        put_header(frame, message_id, rig.app.session._delivery.expected)
+        put_header(frame, message_id, rig.app.server.window.expected)
         largest = chance.choice([8, 64, 256])
         frame[4 : 4 + size] = bytes(chance.randrange(largest) for _ in range(size))
         if message_id == messages.HELLO:  # which must not open another session
             frame[6:10] = rig.session.to_bytes(4, "little") if size >= 6 else bytes(4)
-        rig.hands.to_device += frame[: finish_frame(frame, HEADER + size, crc32_into, rig.key)]
+        rig.hal.to_device += frame[: finish_frame(frame, HEADER + size, crc32_into, rig.key)]
         rig.tick(2)
         answers = [message for message in rig.heard() if message.id != messages.TELEMETRY]
         assert len(answers) == 1
-    assert rig.app.exceptions == 0
+    assert rig.app.stats.exceptions == 0

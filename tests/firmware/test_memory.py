@@ -17,15 +17,12 @@ import gc, micropython
 from bubble_firmware import boards
 from bubble_firmware.app import App
 from bubble_firmware.drivers.flash import Memory
+from bubble_firmware.hal.base import Hal
 
-class Hands:
+class FollowingHal(Hal):
     # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick and between ticks.
-    boot_id = 1
-    late_ticks = 0
-    alarms = boot_faults = 0
-    self_test = False
-
     def __init__(self, board, requests):
+        super().__init__(board)
         self.n = board.BUBBLES
         self.zero = board.SENSOR_ZERO
         self.level = bytearray(2 * self.n)
@@ -38,7 +35,7 @@ class Hands:
         self.safe = 0
         self.flash = Memory(16384)
 
-    def sense(self, counts):
+    def read_sensors(self, counts):
         if self.broken:
             raise OSError(5)
         noise = self.noise
@@ -49,7 +46,7 @@ class Hands:
         counts[self.n] = 2550 + (noise & 15)
         self.noise = noise
 
-    def act(self, pulses, pump, dump):
+    def write_outputs(self, pulses, pump, dump):
         level = self.level
         for i in range(self.n):
             height = level[2 * i] | level[2 * i + 1] << 8
@@ -71,7 +68,7 @@ class Hands:
             level[2 * i] = height & 255
             level[2 * i + 1] = height >> 8
 
-    def vent(self):
+    def safe_outputs(self):
         self.safe += 1
 
     def receive(self, buffer):
@@ -89,21 +86,6 @@ class Hands:
         self.sent += 1
         return self.sent & 15 != 0
 
-    def alive(self, mode, faults):
-        pass
-
-    def tidy(self):
-        pass
-
-    def slack(self):
-        pass
-
-    def restart(self, into):
-        pass
-
-    def clear(self):
-        pass
-
     def phase_us(self):
         return 100
 
@@ -115,31 +97,31 @@ def ticks(app, count):
         app.listen()
         micropython.heap_unlock()
 
-def measure(app, hands):
-    hands.fills = hands.vents = hands.rests = hands.sent = 0
+def measure(app, hal):
+    hal.fills = hal.vents = hal.rests = hal.sent = 0
     before = gc.mem_alloc()
     ticks(app, {ticks})
     return gc.mem_alloc() - before
 
-hands = Hands(boards.load({board!r}), bytes.fromhex({requests!r}))
-app = App(boards.load({board!r}), hands)
+hal = FollowingHal(boards.load({board!r}), bytes.fromhex({requests!r}))
+app = App(boards.load({board!r}), hal)
 ticks(app, 300)
 gc.collect()
 gc.disable()
-grown = measure(app, hands)
-decoder = app.session._decoder
-print(grown, app.exceptions, decoder.good, hands.sent, hands.fills, hands.vents, hands.rests, app.player.number)
+grown = measure(app, hal)
+decoder = app.server.decoder
+print(grown, app.stats.exceptions, decoder.good, hal.sent, hal.fills, hal.vents, hal.rests, app.player.event_number)
 print(app.store.wear[0], app.store.wear[1])
 
-exceptions = app.exceptions
-hands.broken = True
-hands.safe = 0
-print(measure(app, hands), app.exceptions - exceptions, hands.safe)
+exceptions = app.stats.exceptions
+hal.broken = True
+hal.safe = 0
+print(measure(app, hal), app.stats.exceptions - exceptions, hal.safe)
 """
 
 ACTIVE = ("SUBSCRIBE", "SHOW up", "STATE", "PING", "INFO", "SHOW down", "PING", "STATE", "INFO", "CLEAR")
 OUT_OF_ORDER = ("SUBSCRIBE", "SHOW up", "STATE", "INFO", "SHOW down", "STATE", "STOP ahead", "STATE")
-SAVING = ("TRIM_WRITE", "STORE_SAVE", "TRIM_READ", "FIGURES other", "STORE_SAVE", "STORE_INFO")
+SAVING = ("TRIM_WRITE", "STORE_SAVE", "TRIM_READ", "TRIM_WRITE other", "STORE_SAVE", "STORE_INFO")
 SEQUENCE = ("SEQUENCE_BEGIN", "SEQUENCE_WRITE", "SEQUENCE_ARM", "SEQUENCE_START", "SEQUENCE_STATE", *["PING"] * 20)
 SEQUENCE += (
     "SEQUENCE_CONTROL pause",
@@ -191,7 +173,7 @@ def request(name, n, number, session):
         "TABLE_READ": lambda: of("TABLE_READ", (1, 10)),
         "TABLE_WRITE": lambda: of("TABLE_WRITE", (1, 4, 60), [(9000, 65535)] * 40),
         "TRIM_WRITE": lambda: of("TRIM_WRITE", (), [(170, 1100, 900, 4000)] * n),
-        "FIGURES other": lambda: of("TRIM_WRITE", (), [(150, 1300, 1100, 3900)] * n),
+        "TRIM_WRITE other": lambda: of("TRIM_WRITE", (), [(150, 1300, 1100, 3900)] * n),
         "garbage": lambda: bytes(range(1, 200)) + b"\0",
         "too high": lambda: of("SHOW", (0,), [(15000,)] * n),
         "wrong count": lambda: of("SHOW", (0,), [(9000,)] * (n + 1)),

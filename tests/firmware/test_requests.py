@@ -22,7 +22,7 @@ def raw(rig, message_id, payload):
     sequence = rig.next_sequence(message_id)
     put_header(frame, message_id, sequence)
     frame[4 : 4 + len(payload)] = payload
-    rig.hands.to_device += bytes(frame[: finish_frame(frame, HEADER + len(payload), crc32_into, rig.key)])
+    rig.hal.to_device += bytes(frame[: finish_frame(frame, HEADER + len(payload), crc32_into, rig.key)])
     rig.heard()
     rig.tick()
     (answer,) = rig.heard()
@@ -37,7 +37,13 @@ def unchanged(rig):
     def all_of_it():
         state = rig.state()
         tables = [rig.ask("TABLE_READ", (bubble, 0)).columns["knot_pa"].sum() for bubble in range(rig.board.BUBBLES)]
-        return rig.app.mode, state["target_um"].tolist(), tables, rig.ask("INFO")["tables_crc"], rig.app.exceptions
+        return (
+            rig.app.safety.mode,
+            state["target_um"].tolist(),
+            tables,
+            rig.ask("INFO")["tables_crc"],
+            rig.app.stats.exceptions,
+        )
 
     rig.show(*range(6000, 6000 + 100 * rig.board.BUBBLES, 100))
     before = all_of_it()
@@ -90,7 +96,7 @@ def test_an_unknown_message_is_refused(rig):
 def test_a_payload_of_the_wrong_length_is_refused(rig):
     for message in codec.BY_ID.values():
         if message.id | messages.REPLY in codec.BY_ID and message.id < messages.REPLY:
-            low = message.least
+            low = message.size_min
             high = PAYLOAD_MAX
             wrong = {low - 1, low + 1} if message.stride else {0, low - 1}
             for size in wrong & set(range(low)) | wrong & {low + 1}:
@@ -104,7 +110,7 @@ def test_hello_introduces_the_board(rig):
         "protocol_min": version.PROTOCOL_MIN,
         "protocol_max": version.PROTOCOL_MAX,
         "schema_crc": zlib.crc32(codec.schema_bytes()),
-        "boot_id": rig.hands.boot_id,
+        "boot_id": rig.hal.boot_id,
         "firmware_major": version.FIRMWARE[0],
         "firmware_minor": version.FIRMWARE[1],
         "firmware_patch": version.FIRMWARE[2],
@@ -135,7 +141,7 @@ def test_ping_gives_token_and_time_back(rig7):
 
 
 def test_info_counts(rig7):
-    rig7.hands.to_device += b"\x05abcd\0" + rig7.encode("PING", 1, (1,)) + encode("PING", 1, (1,))
+    rig7.hal.to_device += b"\x05abcd\0" + rig7.encode("PING", 1, (1,)) + encode("PING", 1, (1,))
     rig7.tick()
     info = rig7.ask("INFO")
     assert (info["frames_good"], info["frames_bad"], info["exceptions"]) == (3, 2, 0), "without the key it is no frame"
@@ -144,7 +150,7 @@ def test_info_counts(rig7):
 
 
 def test_several_requests_in_one_tick_are_answered_in_order(rig7):
-    rig7.hands.to_device += b"".join(rig7.encode("PING", sequence, (sequence,)) for sequence in range(5))
+    rig7.hal.to_device += b"".join(rig7.encode("PING", sequence, (sequence,)) for sequence in range(5))
     rig7.tick()
     assert [reply["token"] for reply in rig7.heard()] == list(range(5))
 
@@ -163,9 +169,9 @@ def test_telemetry_comes_in_its_period_and_counts_what_was_due(rig7):
     )
     assert len(samples) in (5, 6)
 
-    rig7.hands.full = True
+    rig7.hal.full = True
     rig7.tick(12)
-    rig7.hands.full = False
+    rig7.hal.full = False
     assert rig7.heard() == []
     rig7.tick(4)
     (after,) = rig7.heard()
@@ -180,9 +186,9 @@ def test_telemetry_comes_in_its_period_and_counts_what_was_due(rig7):
 def test_chosen_columns_say_the_same_as_the_state_of_that_tick(rig, fields):
     rig.show(*[9000 + 100 * bubble for bubble in range(rig.board.BUBBLES)], over_ms=1000)
     rig.sense(2, 12345)
-    rig.hands.to_device += rig.encode("SUBSCRIBE_FIELDS", rig.next_sequence(messages.SUBSCRIBE_FIELDS), (1, fields))
+    rig.hal.to_device += rig.encode("SUBSCRIBE_FIELDS", rig.next_sequence(messages.SUBSCRIBE_FIELDS), (1, fields))
     rig.tick(8)
-    rig.hands.to_device += rig.encode("STATE", rig.next_sequence(messages.STATE))
+    rig.hal.to_device += rig.encode("STATE", rig.next_sequence(messages.STATE))
     rig.heard()
     rig.tick()
     state, sample = rig.heard()
@@ -211,14 +217,14 @@ def test_chosen_columns_say_the_same_as_the_state_of_that_tick(rig, fields):
 
 
 def test_the_columns_of_telemetry_are_of_the_row_they_name(rig7):
-    """Target, fill and vent from what the hands were told; a gap counted by the device too."""
+    """Target, fill and vent from what the outputs were set to; a gap counted by the device too."""
     rig7.show(12000)
     rig7.ask("SUBSCRIBE_FIELDS", (2, 4))
     rig7.tick(4)
     assert {tuple(sample.columns["value"]) for sample in rig7.heard()} == {(12000,) * 7}
-    rig7.hands.full = True
+    rig7.hal.full = True
     rig7.tick(6)
-    rig7.hands.full = False
+    rig7.hal.full = False
     rig7.tick(2)
     (sample,) = rig7.heard()
     assert sample["dropped"] == 3
@@ -243,7 +249,7 @@ def test_more_columns_than_a_frame_has_room_for_are_refused(rig):
 
 
 def test_ticks_begin_again_before_they_would_allocate(rig7):
-    rig7.app.ticks = (1 << 30) - 3
+    rig7.app.clock.ticks = (1 << 30) - 3
     assert [rig7.ask("PING", (1,))["ticks"] for _ in range(4)] == [(1 << 30) - 2, (1 << 30) - 1, 0, 1]
 
 

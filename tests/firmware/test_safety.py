@@ -33,7 +33,7 @@ def assert_isolated(rig, bubble, fault):
     assert not state["faults"][others].any()
     assert set(state["status"][others]) == {statuses.SETTLED}
     assert not any(vented(rig, other) for other in others)
-    assert rig.app.mode == modes.ACTIVE
+    assert rig.app.safety.mode == modes.ACTIVE
 
 
 WRONG = [
@@ -49,7 +49,7 @@ def go_wrong(rig, bubble, wrong, fault):
     if fault == faults.OVERPRESSURE:
         rig.sense(bubble, wrong(rig))
     else:
-        rig.hands.counts[bubble] = wrong(rig)
+        rig.hal.counts[bubble] = wrong(rig)
 
 
 @pytest.mark.parametrize(("wrong", "fault"), WRONG)
@@ -99,7 +99,7 @@ def test_one_wrong_reading_is_noise(rig7, wrong, fault):
 
 def test_readings_just_inside_the_range_are_believed(rig7):
     for count in (rig7.board.COUNT_LOW + 1, rig7.board.SENSOR_ZERO):
-        rig7.hands.counts[0] = count
+        rig7.hal.counts[0] = count
         rig7.tick(5)
         assert not rig7.state()["faults"].any()
 
@@ -111,7 +111,7 @@ def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
         assert rig.write_table(bubble, [(5000, 0), (14000, 40000)] if bubble == 0 else [(5000, 0), (14000, 34000)])
     rig.app.tables.swap()
     rig.app.bubbles.use_tables()
-    rig.hands.counts[-1] = board.SUPPLY_ZERO + 29000 // board.SUPPLY_PA_PER_COUNT
+    rig.hal.counts[-1] = board.SUPPLY_ZERO + 29000 // board.SUPPLY_PA_PER_COUNT
     rig.sense(0, 26000)
     for bubble in range(1, board.BUBBLES):
         rig.sense(bubble, 18900)  # where their table has 10 mm
@@ -141,10 +141,10 @@ def test_no_fill_valve_is_ever_open_for_longer_than_allowed(rig7, seed):
         if tick % 200 == 0:
             heights = [chance.choice([5000, 8000, 14000, chance.randrange(14001)]) for _ in range(board.BUBBLES)]
             over_ms = chance.choice([0, 0, 500])
-            rig7.hands.to_device += rig7.encode("SHOW", number, (over_ms,), [(height,) for height in heights])
-            rig7.hands.to_device += rig7.encode("CLEAR", number + 1)
+            rig7.hal.to_device += rig7.encode("SHOW", number, (over_ms,), [(height,) for height in heights])
+            rig7.hal.to_device += rig7.encode("CLEAR", number + 1)
             number += 2
-            rig7.hands.counts[-1] = chance.choice([160, 500, 2560, 4000])
+            rig7.hal.counts[-1] = chance.choice([160, 500, 2560, 4000])
         if tick % 50 == 0:
             for bubble in range(board.BUBBLES):
                 rig7.sense(bubble, chance.choice([0, 0, 5000, 21000, 35000, chance.randrange(42000)]))
@@ -155,7 +155,7 @@ def test_no_fill_valve_is_ever_open_for_longer_than_allowed(rig7, seed):
             assert fill == 0 or fill >= board.PULSE_MIN_US or stretch[bubble], "too short for a valve to open"
             stretch[bubble] = stretch[bubble] + fill if fill == board.TICK_US else 0
             assert stretch[bubble] <= board.FILL_MAX_US
-    assert rig7.app.exceptions == 0
+    assert rig7.app.stats.exceptions == 0
 
 
 @pytest.mark.parametrize(("wrong", "fault"), WRONG)
@@ -177,49 +177,49 @@ def test_stop_closes_and_vent_opens_all_valves(rig):
     rig.tick(10)
     rig.ask("STOP")
     rig.tick()  # decided in the tick after the request
-    assert not any(rig.hands.pulses)
+    assert not any(rig.hal.pulses)
     assert set(rig.state()["status"]) == {statuses.STOPPED}
     rig.ask("VENT")
     rig.tick()
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
     assert set(rig.state()["status"]) == {statuses.RESTING}
-    assert rig.app.mode == modes.VENTING
+    assert rig.app.safety.mode == modes.VENTING
 
 
 def test_the_board_starts_vented(rig):
-    assert rig.hands.in_vent
+    assert rig.hal.safe
     rig.tick(3)
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES))
-    assert rig.app.mode == modes.IDLE
+    assert rig.app.safety.mode == modes.IDLE
 
 
 # Exceptions.
 
 
-@pytest.mark.parametrize("hand", ["sense", "act"])
-def test_an_exception_in_the_tick_vents(rig, hand):
+@pytest.mark.parametrize("method", ["read_sensors", "write_outputs"])
+def test_an_exception_in_the_tick_vents(rig, method):
     hold(rig)
-    rig.hands.broken.add(hand)
+    rig.hal.broken.add(method)
     rig.tick()
-    assert rig.hands.in_vent
-    assert rig.app.mode == modes.VENTING
-    assert rig.app.exceptions == 1
+    assert rig.hal.safe
+    assert rig.app.safety.mode == modes.VENTING
+    assert rig.app.stats.exceptions == 1
 
-    rig.hands.broken.clear()
+    rig.hal.broken.clear()
     assert rig.ask("INFO")["exceptions"] == 1
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES)), "it goes on venting until the next SHOW"
 
 
-@pytest.mark.parametrize("hand", ["sense", "act"])
-def test_a_board_that_fails_in_every_tick_still_answers(rig7, hand):
+@pytest.mark.parametrize("method", ["read_sensors", "write_outputs"])
+def test_a_board_that_fails_in_every_tick_still_answers(rig7, method):
     """So that one can ask what is wrong with it; and however often it is asked for a shape, it vents."""
-    rig7.hands.broken.add(hand)
+    rig7.hal.broken.add(method)
     rig7.tick(10)
     assert rig7.ask("INFO")["exceptions"] == 11
     rig7.show(12000)
     rig7.tick()
-    assert rig7.hands.in_vent
-    assert rig7.app.mode == modes.VENTING
+    assert rig7.hal.safe
+    assert rig7.app.safety.mode == modes.VENTING
 
 
 def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
@@ -230,13 +230,13 @@ def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
 
     monkeypatch.setattr(rig7.app, "show", fail)
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.FAULTED
-    assert rig7.hands.in_vent
-    assert rig7.app.mode == modes.VENTING
+    assert rig7.hal.safe
+    assert rig7.app.safety.mode == modes.VENTING
     assert rig7.ask("PING", (1,)).id == messages.PING | messages.REPLY
 
     # A failure later, with no request at hand, has nobody to be told to.
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.FAULTED
-    rig7.hands.broken |= {"sense", "receive"}
+    rig7.hal.broken |= {"read_sensors", "receive"}
     rig7.tick(3)
     assert rig7.heard() == []
 
@@ -246,54 +246,54 @@ def test_the_outputs_are_safe_before_anything_else_is_tried(rig7, monkeypatch):
         raise MemoryError
 
     hold(rig7)
-    rig7.hands.broken.add("sense")
+    rig7.hal.broken.add("read_sensors")
     monkeypatch.setattr(rig7.app.bubbles, "retract", fail)
     with pytest.raises(MemoryError):
         rig7.tick()
-    assert rig7.hands.in_vent
+    assert rig7.hal.safe
 
 
-@pytest.mark.parametrize("hand", ["send", "receive"])
-def test_a_broken_link_does_not_stop_the_tick(rig7, hand):
+@pytest.mark.parametrize("method", ["send", "receive"])
+def test_a_broken_link_does_not_stop_the_tick(rig7, method):
     hold(rig7)
-    rig7.hands.broken.add(hand)
-    rig7.hands.to_device += rig7.encode("PING", 1, (1,))
+    rig7.hal.broken.add(method)
+    rig7.hal.to_device += rig7.encode("PING", 1, (1,))
     rig7.tick(5)
-    rig7.hands.broken.clear()
-    rig7.hands.to_device = b""
+    rig7.hal.broken.clear()
+    rig7.hal.to_device = b""
     answer = rig7.ask("INFO")
     assert answer["exceptions"] >= 1
     assert answer["mode"] == modes.VENTING
-    assert answer["ticks"] == rig7.app.ticks
+    assert answer["ticks"] == rig7.app.clock.ticks
 
 
 def test_a_supply_sensor_at_the_end_of_its_range_stops_the_pump(rig7):
-    rig7.hands.counts[-1] = rig7.board.SUPPLY_ZERO
+    rig7.hal.counts[-1] = rig7.board.SUPPLY_ZERO
     rig7.tick(3)
-    assert rig7.hands.pump == 65535
+    assert rig7.hal.pump == 65535
     for count in (0, rig7.board.COUNT_LOW, rig7.board.COUNT_HIGH, 4095):
-        rig7.hands.counts[-1] = count
+        rig7.hal.counts[-1] = count
         rig7.tick()
-        assert rig7.hands.pump == 0
+        assert rig7.hal.pump == 0
 
 
 def test_a_reservoir_above_its_limit_is_dumped(rig7):
     board = rig7.board
-    rig7.hands.counts[-1] = board.SUPPLY_ZERO + (board.SUPPLY_MAX_PA + 1000) // board.SUPPLY_PA_PER_COUNT
+    rig7.hal.counts[-1] = board.SUPPLY_ZERO + (board.SUPPLY_MAX_PA + 1000) // board.SUPPLY_PA_PER_COUNT
     rig7.tick(30)
-    assert rig7.hands.dump
-    assert rig7.hands.pump == 0
-    rig7.hands.counts[-1] = board.SUPPLY_ZERO + board.SUPPLY_PA // board.SUPPLY_PA_PER_COUNT
+    assert rig7.hal.dump
+    assert rig7.hal.pump == 0
+    rig7.hal.counts[-1] = board.SUPPLY_ZERO + board.SUPPLY_PA // board.SUPPLY_PA_PER_COUNT
     rig7.tick(30)
-    assert not rig7.hands.dump
+    assert not rig7.hal.dump
 
 
 def test_an_exception_between_two_ticks_vents_too(rig7):
     rig7.show(9000)
     rig7.tick(5)
-    rig7.hands.broken = {"receive"}
+    rig7.hal.broken = {"receive"}
     rig7.app.listen()
-    assert rig7.hands.in_vent
-    assert (rig7.app.mode, rig7.app.exceptions) == (modes.VENTING, 1)
-    rig7.hands.broken = set()
+    assert rig7.hal.safe
+    assert (rig7.app.safety.mode, rig7.app.stats.exceptions) == (modes.VENTING, 1)
+    rig7.hal.broken = set()
     assert rig7.ask("INFO")["exceptions"] == 1

@@ -106,7 +106,7 @@ def test_host_and_device_agree(seven, seed):
         assert taken == (sequence is not None), (loops, parts)
         verdicts.append(taken)
     assert 30 < sum(verdicts) < 120, "both kinds were tried"
-    assert seven.rig.app.exceptions == 0
+    assert seven.rig.app.stats.exceptions == 0
 
 
 def test_the_sdks_records_are_those_of_the_protocols_page(seven):
@@ -147,4 +147,4 @@ def test_random_words_never_harm(seven):
         seven.ask("SEQUENCE_START", 7, 0)
         seven.tick(rng.randrange(3))
     assert taken > 20
-    assert seven.rig.app.exceptions == 0
+    assert seven.rig.app.stats.exceptions == 0

@@ -56,33 +56,33 @@ def test_times_that_are_no_whole_ticks_do_not_drift(sequencer):
 def test_a_late_tick_changes_no_later_one(seven):
     start = seven.play(*(seven.all(6000 + 100 * k, after=15) for k in range(40)))
     seven.tick(20)
-    seven.rig.app.ticks += 30  # periods that nobody saw
+    seven.rig.app.clock.ticks += 30  # periods that nobody saw
     seven.until_ended()
     assert seven.begun()[-1] == start + 39 * 3
-    assert seven.rig.app.exceptions == 0
+    assert seven.rig.app.stats.exceptions == 0
 
 
 def test_a_start_at_a_tick(sequencer):
     sequencer.load(sequencer.all(9000, ramp=1000))
-    at = sequencer.rig.app.ticks + 50
+    at = sequencer.rig.app.clock.ticks + 50
     assert sequencer.start(at) == at
     sequencer.tick(20)
     assert sequencer.state()["state"] == sequences.WAITING
-    assert sequencer.rig.app.mode in (modes.BOOT, modes.IDLE), "until then nothing happens"
+    assert sequencer.rig.app.safety.mode in (modes.BOOT, modes.IDLE), "until then nothing happens"
     sequencer.until_ended()
     assert sequencer.begun() == [at]
-    assert sequencer.rig.app.mode == modes.ACTIVE
+    assert sequencer.rig.app.safety.mode == modes.ACTIVE
 
 
 def test_a_start_that_has_passed_is_refused(sequencer):
     sequencer.load(sequencer.all(9000, ramp=1000))
-    now = sequencer.rig.app.ticks
+    now = sequencer.rig.app.clock.ticks
     assert sequencer.refusal("SEQUENCE_START", 7, now) == (errors.TOO_LATE, 1, WHOLE, now, now + 2, 0), (
         "it is heard in the next tick"
     )
     assert sequencer.refusal("SEQUENCE_START", 7, 1)[0] == errors.TOO_LATE
     assert sequencer.state()["state"] == sequences.ARMED
-    soon = sequencer.rig.app.ticks + 2
+    soon = sequencer.rig.app.clock.ticks + 2
     assert sequencer.start(soon) == soon
 
 
@@ -169,13 +169,13 @@ def test_a_condition_that_never_comes_ends_by_its_timeout(seven, then):
     assert seven.events[1][3] == start + 100
     assert seven.told[1]["unsettled"] == 0b0010010, "those that were not there are named"
     assert seven.state()["timeouts"] == 1
-    assert seven.rig.app.mode == mode
+    assert seven.rig.app.safety.mode == mode
     if then == steps.HOLD:
         assert seven.ask("STATE").columns["target_um"].tolist() == targets
 
 
 def test_a_bubble_with_a_fault_never_settles_and_the_others_go_on(seven):
-    seven.rig.hands.counts[2] = 0xFFFF
+    seven.rig.hal.counts[2] = 0xFFFF
     seven.tick(5)
     seven.play(seven.all(5000, tolerance=200, timeout=300), seven.all(5000, after=50))
     seven.until_ended()
@@ -237,7 +237,7 @@ def test_a_repeat_without_end_ends_when_it_is_stopped(seven):
     assert seven.ask("SEQUENCE_CONTROL", 7, sequences.END).id == messages.SEQUENCE_CONTROL | messages.REPLY
     seven.tick()
     assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
-    assert seven.rig.app.mode == modes.HOLDING
+    assert seven.rig.app.safety.mode == modes.HOLDING
 
 
 # Pause, and what ends a sequence.
@@ -266,7 +266,7 @@ def test_pause_stops_time_and_setpoints(seven):
 @pytest.mark.parametrize("waiting", [False, True])
 def test_show_stop_and_vent_end_it(seven, name, waiting):
     seven.load(seven.all(12000, ramp=500), seven.all(6000, ramp=500))
-    seven.start(seven.rig.app.ticks + 100 if waiting else 0)
+    seven.start(seven.rig.app.clock.ticks + 100 if waiting else 0)
     seven.tick(50)
     seven.ask(name, *((0,) if name == "SHOW" else ()), repeated=[(8000,)] * 7 if name == "SHOW" else ())
     seven.tick(200)
@@ -280,21 +280,21 @@ def test_an_emergency_stop_ends_it_and_forbids_another(seven):
     seven.load(seven.all(12000, ramp=500))
     seven.start()
     seven.tick(10)
-    seven.rig.hands.alarms = faults.ESTOP
+    seven.rig.hal.active_faults = faults.ESTOP
     seven.tick(3)
     assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
-    assert seven.rig.app.mode == modes.STOPPED
+    assert seven.rig.app.safety.mode == modes.STOPPED
     seven.ask("SEQUENCE_ARM", 7)
     assert seven.refusal("SEQUENCE_START", 7, 0)[0] == errors.BOARD_FAULT
 
 
 def test_an_emergency_stop_before_the_start_forbids_it(seven):
     seven.load(seven.all(12000, ramp=500))
-    seven.start(seven.rig.app.ticks + 50)
-    seven.rig.hands.alarms = faults.ESTOP
+    seven.start(seven.rig.app.clock.ticks + 50)
+    seven.rig.hal.active_faults = faults.ESTOP
     seven.tick(100)
     assert seven.events == [(SEQUENCE_ENDED, CANCELLED, 0, seven.events[0][3])]
-    assert seven.rig.app.mode == modes.STOPPED
+    assert seven.rig.app.safety.mode == modes.STOPPED
 
 
 def test_it_can_be_armed_and_played_again(seven):
@@ -316,7 +316,7 @@ def test_another_takes_over_where_the_bubbles_are(seven):
         seven.tick()
     seven.load(seven.all(6000, after=100))
     assert seven.events[-1][:2] == (SEQUENCE_ENDED, CANCELLED)
-    assert seven.rig.app.mode == modes.ACTIVE
+    assert seven.rig.app.safety.mode == modes.ACTIVE
     (held,) = set(seven.ask("STATE").columns["target_um"])
     assert 5000 < held < 12000, "neither where they came from nor where they went"
     seven.told.clear()
@@ -372,7 +372,7 @@ def test_a_stream_that_runs_dry_is_held_and_says_so(seven):
     start = seven.start()
     seven.until_ended()
     assert seven.events[-1] == (SEQUENCE_ENDED, UNDERRUN, ring - 1, start + ring)
-    assert seven.rig.app.mode == modes.ACTIVE
+    assert seven.rig.app.safety.mode == modes.ACTIVE
     assert seven.setpoints() == [6000 + ring - ring % 11] * 7
 
 
@@ -496,10 +496,10 @@ def test_more_than_the_memory_is_a_stream_and_room_is_told(sequencer):
 def test_events_that_find_no_room_are_missed_by_their_number(seven):
     seven.load(*(seven.all(6000, after=5) for _ in range(60)))
     seven.start()
-    seven.rig.hands.full = True
+    seven.rig.hal.full = True
     for _ in range(40):
         seven.rig.app.tick()
-    seven.rig.hands.full = False
+    seven.rig.hal.full = False
     seven.until_ended()
     numbers = [one.sequence for one in seven.told]
     assert numbers[-1] == 60

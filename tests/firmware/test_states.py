@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bubble_firmware.device_clock import LATEST, DeviceClock
 from bubble_firmware.safety import state as safety
 from bubble_firmware.safety.fault_log import FaultLog
-from bubble_firmware.tick_stats import later
 from bubble_protocol.schema import errors, modes, system
 from bubble_protocol.schema.faults import BOARD, BUDGET, ESTOP, HOST_SILENT, OVERFILLED, VALVE_CHIP, VENTING
 from bubble_protocol.schema.modes import ACTIVE, BOOT, FAULTED, HOLDING, IDLE, STOPPED
@@ -72,8 +72,8 @@ def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, thin
     rig = new_rig("wristband7")
     for thing in things:
         if isinstance(thing, tuple):
-            rig.hands.alarms = thing[1]
-            rig.app.heard()
+            rig.hal.active_faults = thing[1]
+            rig.app.deadman.host_activity()
             rig.app.tick()
         elif "silence" in thing:
             silence(rig, 210 if "long" in thing else 55)
@@ -84,11 +84,11 @@ def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, thin
         elif thing == "SHOW":
             rig.ask("SHOW", (0,), [(9000,)] * 7)
         else:
-            rig.ask(thing, (rig.app.log.newest,) if thing == "FAULTS_ACK" else (0,) if thing == "PING" else ())
-        mode, faults = rig.app.mode, rig.app.faults
-        if rig.hands.alarms & VENTING:
+            rig.ask(thing, (rig.app.faults.log.newest,) if thing == "FAULTS_ACK" else (0,) if thing == "PING" else ())
+        mode, faults = rig.app.safety.mode, rig.app.faults.board
+        if rig.hal.active_faults & VENTING:
             rig.tick()
-            assert rig.app.mode == (STOPPED if rig.app.faults & ESTOP else FAULTED)
+            assert rig.app.safety.mode == (STOPPED if rig.app.faults.board & ESTOP else FAULTED)
             assert vented(rig), "whatever was asked"
         elif faults & ESTOP:
             assert mode == STOPPED
@@ -96,22 +96,22 @@ def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, thin
             assert mode == FAULTED
         else:
             assert mode not in (STOPPED, FAULTED)
-    assert rig.app.exceptions == 0
+    assert rig.app.stats.exceptions == 0
 
 
 def test_boot_idle_active_venting_idle(rig):
-    assert rig.app.mode == BOOT
+    assert rig.app.safety.mode == BOOT
     rig.tick()
-    assert rig.app.mode == IDLE
+    assert rig.app.safety.mode == IDLE
     hold(rig)
-    assert rig.app.mode == ACTIVE
+    assert rig.app.safety.mode == ACTIVE
     rig.ask("VENT")
     rig.tick(3)
-    assert rig.app.mode == MODE_VENTING
+    assert rig.app.safety.mode == MODE_VENTING
     for bubble in range(rig.board.BUBBLES):
         rig.sense(bubble, 0)
     rig.tick()
-    assert rig.app.mode == IDLE
+    assert rig.app.safety.mode == IDLE
 
 
 # The deadman.
@@ -129,17 +129,17 @@ def test_a_silent_host_holds_what_moves_and_then_vents_to_the_tick(rig, moving):
     for tick in range(1, vent_ticks + 1):
         rig.app.tick()
         expected = MODE_VENTING if tick == vent_ticks else HOLDING if moving and tick >= hold_ticks else ACTIVE
-        assert rig.app.mode == expected, tick
+        assert rig.app.safety.mode == expected, tick
         if expected == HOLDING and tick > hold_ticks:
-            assert not any(rig.hands.pulses)
+            assert not any(rig.hal.pulses)
     assert vented(rig), "decided in the same tick"
     log = rig.ask("FAULTS_READ", (0,))
     assert log.columns["what"].tolist() == [HOST_SILENT] * (2 if moving else 1)
     assert log.columns["value"].tolist() == [250, 1000][0 if moving else 1 :]
     assert set(log.columns["bubble"]) == {BOARD}
-    assert not rig.app.faults, "it forbids nothing"
+    assert not rig.app.faults.board, "it forbids nothing"
     rig.show(HELD_UM)
-    assert rig.app.mode == ACTIVE
+    assert rig.app.safety.mode == ACTIVE
 
 
 def test_a_host_that_speaks_is_not_silent(rig7):
@@ -148,21 +148,21 @@ def test_a_host_that_speaks_is_not_silent(rig7):
     for _ in range(30):
         silence(rig7, 48)
         rig7.ask("PING", (0,))
-        assert rig7.app.mode == ACTIVE
+        assert rig7.app.safety.mode == ACTIVE
     garbage = b"\x07garbage\x00"
     for _ in range(25):
-        rig7.hands.to_device += garbage
+        rig7.hal.to_device += garbage
         silence(rig7, 10)
-    assert rig7.app.mode == MODE_VENTING
+    assert rig7.app.safety.mode == MODE_VENTING
 
 
 def test_held_by_stop_it_vents_when_the_host_is_silent(rig7):
     hold(rig7)
     rig7.ask("STOP")
     silence(rig7, 199)
-    assert rig7.app.mode == HOLDING
+    assert rig7.app.safety.mode == HOLDING
     silence(rig7, 1)
-    assert rig7.app.mode == MODE_VENTING
+    assert rig7.app.safety.mode == MODE_VENTING
 
 
 # Settings.
@@ -183,9 +183,9 @@ def test_settings_are_kept_within_the_boards_limits(rig7):
     hold(rig7)
     rig7.ask("PING", (0,))
     silence(rig7, 999)
-    assert rig7.app.mode == ACTIVE
+    assert rig7.app.safety.mode == ACTIVE
     silence(rig7, 1)
-    assert rig7.app.mode == MODE_VENTING
+    assert rig7.app.safety.mode == MODE_VENTING
 
 
 def test_the_budget_vents_a_bubble_and_lets_it_recover(rig7):
@@ -213,10 +213,10 @@ def test_the_budget_vents_a_bubble_and_lets_it_recover(rig7):
 
 def test_what_comes_after_the_entry_acknowledged_stays(rig7):
     hold(rig7)
-    rig7.hands.counts[0] = 0
+    rig7.hal.counts[0] = 0
     rig7.tick(5)
     seen = rig7.ask("FAULTS_READ", (0,))["newest"]
-    rig7.hands.counts[1] = 0
+    rig7.hal.counts[1] = 0
     rig7.tick(5)
     rig7.sense(0, 0)
     rig7.ask("FAULTS_ACK", (seen,))
@@ -230,7 +230,7 @@ def test_what_comes_after_the_entry_acknowledged_stays(rig7):
 
 def test_the_log_keeps_the_last_sixteen(rig7):
     for tick in range(40):
-        rig7.app.log.add(tick, 1, 0, tick)
+        rig7.app.faults.log.add(tick, 1, 0, tick)
     first = rig7.ask("FAULTS_READ", (0,))
     rest = rig7.ask("FAULTS_READ", (int(first.columns["id"][-1]),))
     assert [*first.columns["id"], *rest.columns["id"]] == list(range(25, 41))
@@ -244,11 +244,15 @@ def test_ids_end_before_integers_become_long():
 
 
 def test_device_time_wraps_before_integers_become_long(rig7):
-    last = system.TICKS_WRAP - 1
-    assert (later(last, 0), later(last, 1), later(last - 3, 10)) == (last, 0, 6)
-    rig7.app.ticks = last - 1
+    assert system.TICKS_WRAP - 1 == LATEST
+    clock = DeviceClock()
+    for ticks, periods, expected in ((LATEST, 0, LATEST), (LATEST, 1, 0), (LATEST - 3, 10, 6)):
+        clock.ticks = ticks
+        clock.advance(periods)
+        assert clock.ticks == expected
+    rig7.app.clock.ticks = LATEST - 1
     rig7.tick(3)
-    assert rig7.app.ticks == 1
+    assert rig7.app.clock.ticks == 1
 
 
 def test_an_overfilled_bubble_vents_all_and_empties_the_reservoir(rig7):
@@ -259,20 +263,20 @@ def test_an_overfilled_bubble_vents_all_and_empties_the_reservoir(rig7):
     rig7.tick(5)
     rig7.sense(2, 25000)  # it fills by itself
     rig7.tick(1 + 300000 // rig7.board.TICK_US)
-    assert rig7.app.mode == FAULTED
-    assert rig7.app.faults == OVERFILLED
+    assert rig7.app.safety.mode == FAULTED
+    assert rig7.app.faults.board == OVERFILLED
     rig7.tick()
-    assert (rig7.hands.pump, rig7.hands.dump) == (0, 1)
+    assert (rig7.hal.pump, rig7.hal.dump) == (0, 1)
     assert vented(rig7)
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.BOARD_FAULT
 
 
 def test_no_fill_valve_opens_to_a_supply_below_the_bubble(rig7):
     hold(rig7)
-    rig7.hands.counts[-1] = rig7.board.SUPPLY_ZERO + 20000 // rig7.board.SUPPLY_PA_PER_COUNT
+    rig7.hal.counts[-1] = rig7.board.SUPPLY_ZERO + 20000 // rig7.board.SUPPLY_PA_PER_COUNT
     rig7.tick(40)
     rig7.show(13000)
     for _ in range(300):
         rig7.tick()
-        assert not any(rig7.hands.pulses[::2])
+        assert not any(rig7.hal.pulses[::2])
     assert not any(rig7.app.bubbles.faults(bubble) for bubble in range(7)), "nor is that the bubbles' fault"

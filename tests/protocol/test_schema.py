@@ -3,7 +3,7 @@
 import pytest
 
 from bubble_firmware import boards
-from bubble_firmware.handlers.requests import _KNOTS_PER_MESSAGE
+from bubble_firmware.handlers.tables import KNOTS_PER_MESSAGE
 from bubble_protocol import codec, steps
 from bubble_protocol.frame import PAYLOAD_MAX
 from bubble_protocol.schema import (
@@ -110,7 +110,7 @@ def test_a_frame_has_room_for_every_bubble(name, entries):
     message = codec.BY_NAME[name]
     assert message.fixed_size + entries * message.stride <= PAYLOAD_MAX
     assert max(boards.load(board).BUBBLES for board in NAMES) <= BUBBLES
-    assert _KNOTS_PER_MESSAGE == 48
+    assert KNOTS_PER_MESSAGE == 48
 
 
 def test_every_message_fits_a_frame():

@@ -29,10 +29,10 @@ def test_in_virtual_time_a_host_that_stops_is_noticed_to_the_tick():
         skin.show(np.full(7, 12.0), over=20.0, wait=False)
         board, tick = skin.simulated, skin.info.tick
         asked = board.time  # answered in the tick that has just passed
-        while board.firmware.app.mode == modes.ACTIVE:
+        while board.firmware.app.safety.mode == modes.ACTIVE:
             board.tick()
         held = board.time - tick  # the tick that decided it began then
-        while board.firmware.app.mode == modes.HOLDING:
+        while board.firmware.app.safety.mode == modes.HOLDING:
             board.tick()
         vented = board.time - tick
         assert held - asked == pytest.approx(0.25 - tick)
@@ -56,7 +56,7 @@ def test_a_killed_process_is_noticed():
     def run():
         app = board.firmware.app
         for _ in serve(board, end, lambda: running):
-            seen.append((app.ticks, app.deadman.silent_ticks, app.mode))
+            seen.append((app.clock.ticks, app.deadman.silent_ticks, app.safety.mode))
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -64,16 +64,16 @@ def test_a_killed_process_is_noticed():
         host = subprocess.Popen([sys.executable, "-c", HOST, end.name], stdout=subprocess.PIPE, text=True)
         try:
             assert host.stdout.readline() == "moving\n"
-            assert board.firmware.app.mode == modes.ACTIVE
+            assert board.firmware.app.safety.mode == modes.ACTIVE
             host.send_signal(signal.SIGKILL)
             host.wait()
-            killed = board.firmware.app.ticks
+            killed = board.firmware.app.clock.ticks
         finally:
             with contextlib.suppress(ProcessLookupError):
                 host.kill()
             host.stdout.close()
         for _ in range(600):
-            if board.firmware.app.ticks > killed + 300:
+            if board.firmware.app.clock.ticks > killed + 300:
                 break
             threading.Event().wait(0.05)
         with bs.connect(end.name) as skin:

@@ -40,7 +40,7 @@ class Times(Transport):
 
 
 def heard(served):
-    return served.board.firmware.app.session.heard
+    return served.board.firmware.app.server.decoder.good
 
 
 def keepers():
@@ -69,7 +69,7 @@ def test_as_virtual_time_passes(event_loop):
         run_sync(script())
     assert len(line.times) > 60
     assert np.diff(line.times).max() <= GAP + TICK + 1e-9
-    assert board.firmware.app.session.heard >= len(line.times) - 1
+    assert board.firmware.app.server.decoder.good >= len(line.times) - 1
     assert not keepers(), "no thread where time is virtual"
 
 

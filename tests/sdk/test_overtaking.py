@@ -15,13 +15,13 @@ pytestmark = pytest.mark.timeout(60)
 
 def journal(board):
     """The first height of every SHOW that is applied, in order."""
-    applied, show = [], board.firmware.app.show
+    applied, show = [], board.firmware.app.commands.show
 
     def tapped(values, first, over_ms):
         applied.append(values[first])
         show(values, first, over_ms)
 
-    board.firmware.app.show = tapped
+    board.firmware.app.commands.show = tapped
     return applied
 
 
@@ -37,7 +37,7 @@ def test_overtaken_or_applied_and_nothing_after(urgent, seed):
         shows = [asyncio.create_task(skin.show(np.full(7, 6.0 + k / 10), wait=False)) for k in range(30)]
         await skin.sleep(0.01)
         await getattr(skin, urgent)()
-        mode, so_far = board.firmware.app.mode, len(applied)
+        mode, so_far = board.firmware.app.safety.mode, len(applied)
         outcomes = await asyncio.gather(*shows, return_exceptions=True)
         assert len(applied) == so_far < 30, "nothing is applied after it"
         state = await skin.state()

@@ -14,6 +14,7 @@ from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.table import KNOTS_MAX, Tables
 from bubble_firmware.control.trim import Trim
 from bubble_firmware.store import record
+from bubble_firmware.store.record import Content
 from bubble_firmware.store.slots import Store
 from bubbleskin.sim.flash import NorFlash
 
@@ -21,11 +22,14 @@ from bubbleskin.sim.flash import NorFlash
 class Settings:
     """What the store asks of settings: values, and whether some would be allowed."""
 
+    DEFAULTS = 250, 1000, -5
+
     def __init__(self):
-        self.values = array("i", (250, 1000, -5))
+        self.count = 3
+        self.values = array("i", self.DEFAULTS)
         self.wanted = array("i", self.values)
 
-    def flaw(self, values, at, count):
+    def first_invalid(self, values, at, count):
         """Of `count` pairs of setting and value."""
         self.wanted[:] = self.values
         for index in range(count):
@@ -34,6 +38,9 @@ class Settings:
 
     def use(self):
         self.values[:] = self.wanted
+
+    def use_defaults(self):
+        self.values[:] = array("i", self.DEFAULTS)
 
 
 def board(name="wristband7", bubbles=None):
@@ -45,17 +52,14 @@ def board(name="wristband7", bubbles=None):
 class Device:
     """As much of the firmware as the store deals with, booted from `flash`."""
 
-    def __init__(self, flash, data=None, settings=True):
+    def __init__(self, flash, data=None):
         self.board = data or board(bubbles=1)
         self.tables = Tables(self.board.BUBBLES)
         self.bubbles = Bubbles(self.board, self.tables)
-        self.figures = Trim(self.board, self.bubbles)
-        if settings:
-            self.settings = Settings()
-        self.store = Store(self, flash)
-
-    def use_settings(self):
-        """They have changed."""
+        self.trim = Trim(self.board, self.bubbles)
+        self.settings = Settings()
+        content = Content(self.board, self.tables, self.bubbles, self.trim, self.settings)
+        self.store = Store(self.board.NAME, flash, content)
 
     def change(self, number):
         """Make everything in use tell of `number`, so that a mix of two would show."""
@@ -67,7 +71,7 @@ class Device:
                 height = 4000 + 10000 * knot // (size - 1)
                 self.tables.write_knot(bubble, knot, height, (number * 7 + bubble + knot) % 40000)
         self.tables.swap()
-        self.figures.use(array("i", [160 + number % 80, 1000 + number % 999, 999, 4000] * n))
+        self.trim.use(array("i", [160 + number % 80, 1000 + number % 999, 999, 4000] * n))
         self.settings.values[:] = array("i", [number, 1000 + number, -number])
         return self.content
 
@@ -78,9 +82,8 @@ class Device:
             for bubble, size in enumerate(self.tables.sizes)
         ]
         found = array("i", bytes(4 * trim.COUNT * self.board.BUBBLES))
-        self.figures.read(found)
-        settings = self.settings.values.tolist() if hasattr(self, "settings") else []
-        return tuple(tables), tuple(found), tuple(settings)
+        self.trim.read(found)
+        return tuple(tables), tuple(found), tuple(self.settings.values)
 
 
 FACTORY_CONTENT = Device(None).content

@@ -36,9 +36,9 @@ def test_what_is_written_is_what_struct_and_zlib_make(kit):
 
 @pytest.mark.parametrize("name", list(PRICE))
 def test_a_record_of_full_tables_has_the_size_of_the_page_on_it(kit, name):
-    device = kit.Device(NorFlash(), kit.board(name), settings=False)
+    device = kit.Device(NorFlash(), kit.board(name))
     assert device.store.save()
-    assert device.store.length == PRICE[name]
+    assert device.store.length == PRICE[name] + 4 * device.settings.count
 
 
 @pytest.mark.parametrize(
@@ -105,18 +105,18 @@ def test_another_boards_record_is_left_alone(kit):
 
 def test_an_older_schema_lacks_what_has_been_added_since(kit):
     device = kit.Device(None)
-    tables, figures, settings = device.change(10)
-    factory_tables, factory_figures, factory_settings = kit.FACTORY_CONTENT
-    whole = kit.sections_of((tables, figures, settings))
-    shorter = kit.sections_of((tables, figures[:2], settings[:1]))
+    tables, trim, settings = device.change(10)
+    factory_tables, factory_trim, factory_settings = kit.FACTORY_CONTENT
+    whole = kit.sections_of((tables, trim, settings))
+    shorter = kit.sections_of((tables, trim[:2], settings[:1]))
     for sections, expected in (
-        ((whole[1],), (tables, factory_figures, factory_settings)),
-        ((whole[3], whole[1]), (tables, figures, factory_settings)),
+        ((whole[1],), (tables, factory_trim, factory_settings)),
+        ((whole[3], whole[1]), (tables, trim, factory_settings)),
         (
             (shorter[1], shorter[2], shorter[3]),
-            (tables, figures[:2] + factory_figures[2:], settings[:1] + factory_settings[1:]),
+            (tables, trim[:2] + factory_trim[2:], settings[:1] + factory_settings[1:]),
         ),
-        ((whole[2],), (factory_tables, factory_figures, settings)),
+        ((whole[2],), (factory_tables, factory_trim, settings)),
     ):
         flash = kit.flash_with(kit.make_record(sections, 9, schema=record.SCHEMA - 1))
         device = kit.Device(flash)
@@ -129,17 +129,17 @@ def test_an_older_schema_lacks_what_has_been_added_since(kit):
 
 def test_what_the_board_does_not_allow_is_not_used(kit):
     device = kit.Device(None)
-    tables, figures, settings = device.change(10)
+    tables, trim, settings = device.change(10)
     older = kit.make_record(kit.sections_of(device.content).values(), 1)
     high = struct.pack("<HHHH", 4000, 0, 14000, 42001).hex()
     short = struct.pack("<HHHH", 4000, 0, 13999, 40000).hex()
     falling = struct.pack("<HHHHHH", 4000, 0, 3000, 10, 14000, 20).hex()
     for unfit in (
-        *(((table,), figures, settings) for table in (high, short, falling, "00000000")),
-        *((tables, (zero, *figures[1:]), settings) for zero in (160 + 89, 160 - 89)),
-        (tables, (figures[0], 2501, *figures[2:]), settings),
-        (tables, (*figures[:3], 3984 * 4 + 1), settings),
-        (tables, figures, (-1, *settings[1:])),
+        *(((table,), trim, settings) for table in (high, short, falling, "00000000")),
+        *((tables, (zero, *trim[1:]), settings) for zero in (160 + 89, 160 - 89)),
+        (tables, (trim[0], 2501, *trim[2:]), settings),
+        (tables, (*trim[:3], 3984 * 4 + 1), settings),
+        (tables, trim, (-1, *settings[1:])),
     ):
         newer = kit.make_record(kit.sections_of(unfit).values(), 2)
         alone = kit.Device(kit.flash_with(newer))
@@ -147,7 +147,7 @@ def test_what_the_board_does_not_allow_is_not_used(kit):
         assert alone.store.states[0] == store.SLOT_REJECTED
         flash = kit.flash_with(older, newer)
         both = kit.Device(flash)
-        assert (both.store.source, both.content) == (store.SLOT_A, (tables, figures, settings))
+        assert (both.store.source, both.content) == (store.SLOT_A, (tables, trim, settings))
         last = both.change(30)
         assert both.store.save()
         assert (kit.Device(flash).content, kit.Device(flash).store.generation) == (last, 3)

@@ -12,16 +12,20 @@ from bubble_firmware import boards
 from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.drivers.flash import Memory
 from bubble_firmware.control.trim import Trim
+from bubble_firmware.store.record import Content
 from bubble_firmware.store.slots import Store
 from bubble_firmware.control.table import Tables
 
 
 class Settings:
+    count = 4
+
     def __init__(self):
         self.values = array("i", (250, -1000, 0x7FFFFFFF, -0x80000000))
+        self.defaults = array("i", self.values)
         self.wanted = array("i", self.values)
 
-    def flaw(self, values, at, count):
+    def first_invalid(self, values, at, count):
         self.wanted[:] = self.values
         for index in range(count):
             self.wanted[values[at + 2 * index]] = values[at + 2 * index + 1]
@@ -30,18 +34,19 @@ class Settings:
     def use(self):
         self.values[:] = self.wanted
 
+    def use_defaults(self):
+        self.values[:] = self.defaults
+
 
 class Device:
     def __init__(self, flash):
         self.board = boards.load({board!r})
         self.tables = Tables(self.board.BUBBLES)
         self.bubbles = Bubbles(self.board, self.tables)
-        self.figures = Trim(self.board, self.bubbles)
+        self.trim = Trim(self.board, self.bubbles)
         self.settings = Settings()
-        self.store = Store(self, flash)
-
-    def use_settings(self):
-        pass
+        content = Content(self.board, self.tables, self.bubbles, self.trim, self.settings)
+        self.store = Store(self.board.NAME, flash, content)
 
 
 def change(device, number):
@@ -52,14 +57,14 @@ def change(device, number):
         device.tables.write_size(bubble, 3 + (number + bubble) % 62)
         device.tables.write_knot(bubble, 2 + (number + bubble) % 62, 14000, 40000 + number)
     device.tables.swap()
-    device.figures.use(array("i", (150 + number, 1000 + number, 900 - number, 4000) * n))
+    device.trim.use(array("i", (150 + number, 1000 + number, 900 - number, 4000) * n))
     device.settings.values[0] = number * 100003
 
 
 def say(device):
     store = device.store
     found = array("i", bytearray(4 * 4 * device.board.BUBBLES))
-    device.figures.read(found)
+    device.trim.read(found)
     print(store.source, store.generation, list(store.states), list(store.wear), store.length, device.tables.crc)
     print(list(found), list(device.settings.values), list(device.tables.sizes))
 

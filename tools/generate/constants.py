@@ -32,7 +32,6 @@ FOLDERS = ("protocol/bubble_protocol", "firmware/bubble_firmware")
 REGION = re.compile(
     r"(?P<head>(?:^# \[constants\] [^\n]*\n)+)(?P<body>.*?)^# \[end of constants\]\n", re.MULTILINE | re.DOTALL
 )
-_TEXT_VALUES = 16
 
 
 def places(name: str) -> dict[str, int]:
@@ -41,7 +40,7 @@ def places(name: str) -> dict[str, int]:
     found, at = {}, 0
     for field in message.fixed:
         found[field[0].upper()] = at
-        at += _TEXT_VALUES if field[1] == messages.TEXT else 1
+        at += codec.TEXT_SIZE if field[1] == messages.TEXT else 1
     for offset, field in enumerate(message.repeated):
         found[field[0].upper()] = at + offset
     if message.repeated:

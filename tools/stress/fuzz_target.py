@@ -10,27 +10,19 @@ from array import array
 from bubble_firmware import boards
 from bubble_firmware.app import App
 from bubble_firmware.control import state_layout as layout
-from bubble_protocol import crc
+from bubble_firmware.hal.base import Hal
 from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import FRAME_MAX, HEADER, PAYLOAD_MAX, finish_frame, put_header
 from bubble_protocol.schema import messages
-from bubbleskin.link import message
 
-# In C, for the sake of speed; test_crc holds them against each other.
-crc._crc32_into = lambda table, buffer, start, end, out, at: message.crc32_into(buffer, start, end, out, at)
 _SESSION = b"\xab\xcd\xef\x01"
 
 
-class Device:
-    """The firmware, on hands that sense what a board at rest does. `check` after each input."""
-
-    late_ticks = alarms = boot_faults = 0
-    self_test = False
-    boot_id = 1
+class Device(Hal):
+    """The firmware on a board at rest. `check` after each input."""
 
     def __init__(self) -> None:
-        self.board = boards.load("wristband7")
-        self._counts = array("H", [self.board.SENSOR_ZERO] * 7 + [2560])
+        super().__init__(boards.load("wristband7"))
         self._in = b""
         self.sent: list[bytes] = []
         self._frame = bytearray(FRAME_MAX)
@@ -43,13 +35,13 @@ class Device:
         payload = payload[:PAYLOAD_MAX]
         put_header(self._frame, message_id, number & 0xFFFF)
         self._frame[4 : 4 + len(payload)] = payload
-        key = self.app.session._delivery.key
+        key = self.app.server.window.key
         self.raw(bytes(self._frame[: finish_frame(self._frame, HEADER + len(payload), crc32_into, key)]))
 
     def raw(self, data: bytes) -> None:
         """Send bytes as they are. Of the tick only the link has its turn, where an exception is not caught."""
         self._in = data
-        self.app.session.poll()
+        self.app.server.poll()
 
     def steps(self, data: bytes) -> None:
         """Do what an input says."""
@@ -58,7 +50,7 @@ class Device:
             what, size = data[at], data[at + 1]
             rest = data[at + 2 : at + 2 + size]
             at += 2 + size
-            expected = self.app.session._delivery.expected
+            expected = self.app.server.window.expected
             if what < 128:
                 self.frame(what, expected, rest)
             elif what < 192:
@@ -73,7 +65,7 @@ class Device:
     def check(self) -> None:
         """No exception, nothing beyond the limits."""
         app = self.app
-        assert app.exceptions == 0, "an exception in the tick"
+        assert app.stats.exceptions == 0, "an exception in the tick"
         rows = app.bubbles.rows
         limit = self.board.HEIGHT_MAX_UM
         for row in range(0, layout.ROW_WORDS * self.board.BUBBLES, layout.ROW_WORDS):
@@ -88,16 +80,10 @@ class Device:
         self.frame(messages.PING, 0, b"1234")
         assert any(frame[1] == messages.PING | messages.REPLY for frame in self.sent), "no answer"
 
-    # The hands.
+    # The hardware.
 
-    def sense(self, counts: array) -> None:
-        counts[:] = self._counts
-
-    def act(self, pulses: array, pump: int, dump: bool) -> None:
+    def write_outputs(self, pulses: array, pump: int, dump: int) -> None:
         self.pulses = pulses[:]
-
-    def vent(self) -> None:
-        pass
 
     def receive(self, buffer: bytearray) -> int:
         data, self._in = self._in[:256], self._in[256:]
@@ -107,24 +93,6 @@ class Device:
     def send(self, frame: bytearray, length: int) -> bool:
         self.sent.append(bytes(frame[:length]))
         return True
-
-    def alive(self, mode: int, faults: int) -> None:
-        pass
-
-    def clear(self) -> None:
-        pass
-
-    def slack(self) -> None:
-        pass
-
-    def tidy(self) -> None:
-        pass
-
-    def restart(self, into: int) -> None:
-        pass
-
-    def phase_us(self) -> int:
-        return 0
 
 
 def one_input(data: bytes) -> None:

@@ -6,7 +6,7 @@
 The firmware's end of the link runs here, without control and plant; the line between it and the SDK's link loses 10 %,
 doubles 5 % and damages 1 % of all frames, reorders 2 % and resets the device now and then after it has applied
 a command and before the answer is read. Each SHOW has a shape of its own, so the journal, which a tap on the
-firmware's handler keeps, says how often and in what order each was applied. Time is virtual.
+firmware's `show` keeps, says how often and in what order each was applied. Time is virtual.
 """
 
 import argparse
@@ -21,10 +21,8 @@ from dataclasses import dataclass, field
 
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_firmware.link import server as firmware_session
-from bubble_protocol.schema import messages
+from bubble_firmware.hal.base import Hal
 from bubbleskin.errors import BubbleskinError, DeviceRefused, DeviceRestarted, LinkError, Overtaken
-from bubbleskin.link import message
 from bubbleskin.link.link import Link
 from bubbleskin.link.transport import Transport
 from bubbleskin.sim.impairment import Impairment, LossyTransport
@@ -33,7 +31,6 @@ IMPAIRMENT = Impairment(
     drop=0.10, duplicate=0.05, flip=0.005, truncate=0.005, reorder=0.02, split=0.02, stall=0.0005, reset=0.01
 )
 WORKERS = 12
-firmware_session.crc32_into = message.crc32_into  # C instead of Python; test_crc holds them against each other
 BASE = 9000
 """SHOW's first two heights are the command's number to this base."""
 
@@ -41,18 +38,15 @@ APPLIED, REFUSED, OVERTAKEN, RESTARTED, UNKNOWN, NOT_SENT = range(6)
 OUTCOMES = ("answered", "refused", "overtaken", "restarted, not applied", "outcome unknown", "not sent")
 
 
-class Device(Transport):
-    """The firmware on hands that sense a board at rest; also a `Transport` to it. Each boot has a journal."""
+class Device(Hal, Transport):
+    """The firmware on a board at rest, and a `Transport` to it. Each boot has a journal."""
 
     name = "soak"
     blocks = False
-    late_ticks = alarms = boot_faults = 0
-    self_test = False
 
     def __init__(self) -> None:
-        self.board = boards.load("wristband7")
+        super().__init__(boards.load("wristband7"))
         self.journals: list[array] = []
-        self._counts = array("H", [self.board.SENSOR_ZERO] * 7 + [2560])
         self._ticks = 0
         self._tick_s = self.board.TICK_US * 1e-6
         self.boot_id = 0
@@ -64,27 +58,25 @@ class Device(Transport):
         self.from_device = bytearray()
         self.boot_id = self.boot_id * 1103515245 + 12345 & 0x3FFFFFFF
         self.app = App(self.board, self)
-        self.app.session._decoder._crc32_into = message.crc32_into
         self.journals.append(array("i"))
         self._tap(self.journals[-1])
 
     def _tap(self, journal: array) -> None:
-        session = self.app.session
-        show, values = session._requests[messages.SHOW], session._values
+        show = self.app.commands.show
 
-        def tapped(count: int) -> None:
-            journal.append(values[1] * BASE + values[2])
-            show(count)
+        def tapped(values: array, first: int, over_ms: int) -> None:
+            journal.append(values[first] * BASE + values[first + 1])
+            show(values, first, over_ms)
 
-        session._requests[messages.SHOW] = tapped
+        self.app.commands.show = tapped  # type: ignore[method-assign]
 
     # The transport.
 
     def read(self, timeout: float) -> bytes:
         until = self.now() + timeout
         while not self.from_device and self.now() < until:
-            self.app.session.poll()  # of the tick, this is all that the link is about
-            self.app.ticks += 1
+            self.app.server.poll()  # of the tick, this is all that the link is about
+            self.app.clock.ticks += 1
             self._ticks += 1
         data = bytes(self.from_device)
         self.from_device.clear()
@@ -99,16 +91,7 @@ class Device(Transport):
     def close(self) -> None:
         pass
 
-    # The hands.
-
-    def sense(self, counts: array) -> None:
-        counts[:] = self._counts
-
-    def act(self, pulses: array, pump: int, dump: bool) -> None:
-        pass
-
-    def vent(self) -> None:
-        pass
+    # The hardware: the link's bytes.
 
     def receive(self, buffer: bytearray) -> int:
         data, self.to_device = self.to_device[:256], self.to_device[256:]
@@ -120,24 +103,6 @@ class Device(Transport):
             return False
         self.from_device += frame[:length]
         return True
-
-    def alive(self, mode: int, faults: int) -> None:
-        pass
-
-    def clear(self) -> None:
-        pass
-
-    def slack(self) -> None:
-        pass
-
-    def tidy(self) -> None:
-        pass
-
-    def restart(self, into: int) -> None:
-        pass
-
-    def phase_us(self) -> int:
-        return 0
 
 
 @dataclass

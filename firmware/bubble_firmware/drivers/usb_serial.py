@@ -36,7 +36,7 @@ def _sending() -> int:
 
 
 class UsbSerial:
-    """`receive` and `send` of a board's hands."""
+    """`receive` and `send` for a board's `Hal`."""
 
     def __init__(self):
         micropython.kbd_intr(-1)  # a byte of 3 is a byte

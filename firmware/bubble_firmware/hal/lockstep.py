@@ -1,4 +1,4 @@
-"""Hands of a board whose hardware is at the other end of a pipe, in lockstep: a tick begins when its input has come.
+"""A board whose hardware is at the other end of a pipe, in lockstep: a tick begins when its input has come.
 
 All words are little-endian and blocks have a fixed size, the link's bytes at their end:
     into the firmware, per tick: u16 size of the link's bytes, u16 counts (per bubble, then the supply's), LINK_IN bytes
@@ -9,9 +9,14 @@ A size of 0xFFFF into the firmware has no answer: power fails and comes back.
 
 import sys
 
-from bubble_firmware.app import LISTEN
 from bubble_firmware.drivers.flash import SECTOR, Memory
-from bubble_protocol.frame import copy
+from bubble_firmware.hal.base import LISTEN, Hal
+from bubble_protocol.buffers import copy, put16
+from bubble_protocol.mpy_compat import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from array import array
+    from types import ModuleType
 
 LINK_IN = 256
 """Bytes of the link that the firmware takes in one tick."""
@@ -21,15 +26,12 @@ RESET = 0xFF
 _FLASH = 4 * SECTOR
 
 
-class Hands:
-    """What `bubble_firmware.app` calls, on stdin and stdout of this interpreter."""
+class LockstepHal(Hal):
+    """The hardware of `board`, on stdin and stdout of this interpreter. `ended`: the pipe has closed."""
 
-    late_ticks = 0
-    alarms = 0
-    boot_faults = 0
-    self_test = False
-
-    def __init__(self, bubbles, boot_id):
+    def __init__(self, board: "ModuleType", boot_id: int):
+        super().__init__(board)
+        bubbles = board.BUBBLES
         self.boot_id = boot_id
         self.flash = Memory(_FLASH)
         self.ended = False
@@ -44,11 +46,11 @@ class Hands:
         self._phase_us = 0
         self._answered = True
 
-    def wait(self):
+    def wait(self) -> int:
         """Hand over what the last block led to and wait for the next; 0 for a restart or when the pipe has closed."""
         if not self._answered:
             out = self._out
-            _put(out, 0, self._sent)
+            put16(out, 0, self._sent)
             self._stdout.write(out)
             self._sent = 0
         self._answered = True
@@ -70,42 +72,42 @@ class Hands:
         self._phase_us = 0
         return 1
 
-    def sense(self, counts):
+    def read_sensors(self, counts: "array[int]") -> None:
         """Fill in the counts of this tick."""
         block = self._in
         for index in range(len(counts)):
             at = 2 + 2 * index
             counts[index] = block[at] | block[at + 1] << 8
 
-    def act(self, pulses, pump, dump):
+    def write_outputs(self, pulses: "array[int]", pump: int, dump: int) -> None:
         """Set the outputs of the next period."""
         out = self._out
         at = 2
         for index in range(len(pulses)):
-            _put(out, at, pulses[index])
+            put16(out, at, pulses[index])
             at += 2
-        _put(out, at, pump)
-        _put(out, at + 2, 1 if dump else 0)
+        put16(out, at, pump)
+        put16(out, at + 2, 1 if dump else 0)
 
-    def vent(self):
+    def safe_outputs(self) -> None:
         """Fill closed, vent open, pump off."""
         out = self._out
         at = 2
         while at < self._link_out - 4:
-            _put(out, at, 0)
-            _put(out, at + 2, 65535)
+            put16(out, at, 0)
+            put16(out, at + 2, 65535)
             at += 4
-        _put(out, at, 0)
-        _put(out, at + 2, 0)
+        put16(out, at, 0)
+        put16(out, at + 2, 0)
 
-    def receive(self, buffer):
+    def receive(self, buffer: bytearray) -> int:
         """Bytes that have come over the link."""
         block = self._in
         size = block[0] | block[1] << 8
         copy(block, self._link_in, self._link_in + size, buffer, 0)
         return size
 
-    def send(self, frame, length):
+    def send(self, frame: bytearray, length: int) -> bool:
         """Queue a frame; False where it does not fit."""
         if self._sent + length > LINK_OUT:
             return False
@@ -113,27 +115,10 @@ class Hands:
         self._sent += length
         return True
 
-    def alive(self, mode, faults):
-        """There is no watchdog."""
-
-    def clear(self):
-        """Nothing here fails."""
-
-    def slack(self):
-        """Time stands still within a tick."""
-
-    def tidy(self):
-        """The interpreter collects by itself."""
-
-    def restart(self, into):
+    def restart(self, into: int) -> None:
         """Start again when this tick has been handed over; flash stays as it is."""
         self._restarting = True
 
-    def phase_us(self):
+    def phase_us(self) -> int:
         """Time stands still within a tick; between ticks it is told."""
         return self._phase_us
-
-
-def _put(block, at, value):
-    block[at] = value & 255
-    block[at + 1] = value >> 8

@@ -1,197 +1,310 @@
-"""Requests about sequences: what is refused and why, and events as they happen. `sequence.Player` does the rest."""
+"""Requests about the sequence in memory, SEQUENCE_BEGIN to SEQUENCE_STATE: what is refused and why; and its events."""
 
 from array import array
 
+from bubble_firmware.link.reply import Handlers
 from bubble_protocol import steps
 from bubble_protocol.crc import crc32_word
-from bubble_protocol.schema import errors, faults, messages, sequences, system
-from bubble_protocol.schema.sequences import ARMED, EMPTY, ENDED, LOADING, PAUSED, PLAYING
+from bubble_protocol.frame import PAYLOAD_MAX
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
-_NO_ELEMENT = 255
-_WRITE_HEAD = 4  # bytes of SEQUENCE_WRITE before the words
-_WORDS_MAX = 121  # in one SEQUENCE_WRITE
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+    from bubble_firmware.board_state import BoardState
+    from bubble_firmware.commands import Commands
+    from bubble_firmware.link.reply import Reply
+    from bubble_firmware.link.sender import Sender
+    from bubble_firmware.sequence.player import Player
+
+# [constants] bubble_protocol.schema.messages: SEQUENCE_BEGIN SEQUENCE_WRITE SEQUENCE_ARM SEQUENCE_START
+# [constants] bubble_protocol.schema.messages: SEQUENCE_CONTROL SEQUENCE_STATE SEQUENCE_EVENT
+# [constants] bubble_protocol.schema.errors: BAD_CRC BAD_LOOP BAD_STEP BOARD_FAULT NO_ELEMENT NO_ROOM NOT_READY OUT_OF_ORDER
+# [constants] bubble_protocol.schema.errors: TOO_LATE WRONG_BOARD WRONG_COUNT WRONG_LENGTH
+# [constants] bubble_protocol.schema.faults: VENTING as VENTING_FAULTS
+# [constants] bubble_protocol.schema.sequences: EMPTY LOADING ARMED PLAYING PAUSED ENDED
+# [constants] bubble_protocol.schema.sequences: PAUSE as ACTION_PAUSE END as ACTION_END
+# [constants] bubble_protocol.schema.system: CAN_SEQUENCES
+# [constants] bubble_protocol.steps: ASKED LOW HIGH LOOP
+# [constants] message SEQUENCE_BEGIN as BEGIN: *
+# [constants] message SEQUENCE_BEGIN_REPLY as BEGUN: *
+# [constants] message SEQUENCE_WRITE as WRITE: *
+# [constants] message SEQUENCE_WRITE_REPLY as WRITTEN: *
+# [constants] message SEQUENCE_START as START: *
+# [constants] message SEQUENCE_START_REPLY as STARTED: *
+# [constants] message SEQUENCE_CONTROL as CONTROL: ACTION
+# [constants] message SEQUENCE_STATE_REPLY as STATE: *
+_SEQUENCE_BEGIN = const(32)
+_SEQUENCE_WRITE = const(33)
+_SEQUENCE_ARM = const(34)
+_SEQUENCE_START = const(35)
+_SEQUENCE_CONTROL = const(36)
+_SEQUENCE_STATE = const(37)
+_SEQUENCE_EVENT = const(38)
+_BAD_CRC = const(6)
+_BAD_LOOP = const(20)
+_BAD_STEP = const(19)
+_BOARD_FAULT = const(9)
+_NO_ELEMENT = const(255)
+_NO_ROOM = const(22)
+_NOT_READY = const(23)
+_OUT_OF_ORDER = const(21)
+_TOO_LATE = const(24)
+_WRONG_BOARD = const(18)
+_WRONG_COUNT = const(4)
+_WRONG_LENGTH = const(2)
+_VENTING_FAULTS = const(135)
+_EMPTY = const(0)
+_LOADING = const(1)
+_ARMED = const(2)
+_PLAYING = const(4)
+_PAUSED = const(5)
+_ENDED = const(6)
+_ACTION_PAUSE = const(0)
+_ACTION_END = const(2)
+_CAN_SEQUENCES = const(8)
+_ASKED = const(8)
+_LOW = const(9)
+_HIGH = const(10)
+_LOOP = const(255)
+_BEGIN_SEQUENCE = const(0)
+_BEGIN_BUBBLES = const(1)
+_BEGIN_BOARD_CRC = const(2)
+_BEGIN_RECORDS = const(3)
+_BEGIN_CRC = const(4)
+_BEGUN_TICKS = const(0)
+_BEGUN_FREE = const(1)
+_BEGUN_CAPACITY = const(2)
+_WRITE_SEQUENCE = const(0)
+_WRITE_FIRST = const(1)
+_WRITE_WORD = const(2)
+_WRITE_STRIDE = const(1)
+_WRITTEN_TICKS = const(0)
+_WRITTEN_FREE = const(1)
+_WRITTEN_RECEIVED = const(2)
+_START_SEQUENCE = const(0)
+_START_START_TICKS = const(1)
+_STARTED_TICKS = const(0)
+_STARTED_START_TICKS = const(1)
+_CONTROL_ACTION = const(1)
+_STATE_TICKS = const(0)
+_STATE_SEQUENCE = const(1)
+_STATE_STATE = const(2)
+_STATE_REASON = const(3)
+_STATE_RECORD = const(4)
+_STATE_BEGUN_TICKS = const(5)
+_STATE_UNSETTLED = const(6)
+_STATE_TIMEOUTS = const(7)
+_STATE_RECEIVED = const(8)
+_STATE_FREE = const(9)
+_STATE_CAPACITY = const(10)
+# [end of constants]
+
+_SEQUENCE = const(_BEGIN_SEQUENCE)  # the host's number of the sequence comes first in every request
+_WRITE_HEAD = const(4)  # bytes of SEQUENCE_WRITE before the words
+_WORDS_MAX = (PAYLOAD_MAX - _WRITE_HEAD) // 2  # in one SEQUENCE_WRITE
 
 
-class SequenceRequests:
-    """Handlers for `session`, which checks the schema's limits first; each answers once."""
+class SequenceHandlers(Handlers):
+    """The sequence in the memory of `player`. Call `send_events` while the player has some."""
 
-    def __init__(self, app, session):
-        self._app = app
-        self._player = app.player
-        self._session = session
-        self._values = session._values
-        name = app.board.NAME.encode()
-        self._names = array("i", (crc32_word(name, 0, len(name)), 0))
-        self._crc = array("i", (0,))
-        session.capabilities |= system.CAN_SEQUENCES
-        session.serve(
-            {
-                messages.SEQUENCE_BEGIN: self._begin,
-                messages.SEQUENCE_WRITE: self._write,
-                messages.SEQUENCE_ARM: self._arm,
-                messages.SEQUENCE_START: self._start,
-                messages.SEQUENCE_CONTROL: self._control,
-                messages.SEQUENCE_STATE: self._state,
-            }
-        )
+    capabilities = _CAN_SEQUENCES
 
-    def tell(self):
+    def __init__(
+        self,
+        sender: "Sender",
+        reply: "Reply",
+        board: "ModuleType",
+        state: "BoardState",
+        player: "Player",
+        commands: "Commands",
+    ):
+        self._sender = sender
+        self._reply = reply
+        self._bubbles = board.BUBBLES
+        self._clock = state.clock
+        self._faults = state.faults
+        self._player = player
+        self._commands = commands
+        name = board.NAME.encode()
+        self._boards = array("i", (crc32_word(name, 0, len(name)), 0))  # whose sequences are taken: ours, anyone's
+        self._crc = array("i", (0,))  # that the sequence is to have
+
+    def requests(self) -> "dict[int, Callable[[int], None]]":
+        """See `Handlers`."""
+        return {
+            _SEQUENCE_BEGIN: self._begin,
+            _SEQUENCE_WRITE: self._write,
+            _SEQUENCE_ARM: self._arm,
+            _SEQUENCE_START: self._start,
+            _SEQUENCE_CONTROL: self._control,
+            _SEQUENCE_STATE: self._tell_state,
+        }
+
+    def send_events(self) -> None:
         """Send the events that wait, while there is room."""
         player = self._player
-        while player.waiting_news:
-            player.read_news(self._values)
-            if not self._session.send_unasked(messages.SEQUENCE_EVENT, player.number, 0):
+        sender = self._sender
+        while player.events_waiting:
+            player.read_event(sender.values)
+            if not sender.send_unasked(_SEQUENCE_EVENT, player.event_number, 0):
                 return
-            player.forget_news()
+            player.drop_event()
 
-    def _refuse(self, error, field, asked, low, high):
-        self._session._refuse(error, field, _NO_ELEMENT, asked, low, high)
+    def _refuse(self, error: int, field: int, asked: int, low: int, high: int) -> None:
+        self._reply.refuse(error, field, _NO_ELEMENT, asked, low, high)
 
-    def _is_ours(self):
+    def _is_ours(self) -> bool:
         """Whether the request is about the sequence in memory; refuses where it is not."""
-        if self._player.state != EMPTY and self._values[0] == self._player.id:
+        if self._player.state != _EMPTY and self._reply.values[_SEQUENCE] == self._player.id:
             return True
-        self._not_ready()
+        self._refuse_for_now()
         return False
 
-    def _not_ready(self):
+    def _refuse_for_now(self) -> None:
         sequence = self._player.sequence
-        self._refuse(errors.NOT_READY, 0, self._player.state, sequence.received, sequence.total)
+        self._refuse(_NOT_READY, 0, self._player.state, sequence.received, sequence.total)
 
-    def _begin(self, count):
-        values = self._values
-        bubbles = self._app.board.BUBBLES
-        if values[1] != bubbles:
-            self._refuse(errors.WRONG_COUNT, 1, values[1], bubbles, bubbles)
+    def _begin(self, count: int) -> None:
+        values = self._reply.values
+        bubbles = self._bubbles
+        if values[_BEGIN_BUBBLES] != bubbles:
+            self._refuse(_WRONG_COUNT, _BEGIN_BUBBLES, values[_BEGIN_BUBBLES], bubbles, bubbles)
             return
-        if not steps.same(values, 2, self._names, 0) and not steps.same(values, 2, self._names, 1):
-            self._refuse(errors.WRONG_BOARD, 2, 0, 0, 0)
+        is_same = steps.same_word
+        if not is_same(values, _BEGIN_BOARD_CRC, self._boards, 0) and not is_same(
+            values, _BEGIN_BOARD_CRC, self._boards, 1
+        ):
+            self._refuse(_WRONG_BOARD, _BEGIN_BOARD_CRC, 0, 0, 0)
             return
         player = self._player
-        player.begin(values[0], steps.small(values, 3))
-        steps.keep(values, 4, self._crc, 0)
-        values[0] = self._app.ticks
-        values[1] = player.sequence.free
-        values[2] = player.sequence.capacity
-        self._session._reply(0)
+        player.begin(values[_SEQUENCE], steps.small_word(values, _BEGIN_RECORDS))
+        steps.copy_word(values, _BEGIN_CRC, self._crc, 0)
+        values[_BEGUN_TICKS] = self._clock.ticks
+        values[_BEGUN_FREE] = player.sequence.free
+        values[_BEGUN_CAPACITY] = player.sequence.capacity
+        self._reply.reply(0)
 
-    def _write(self, count):
+    def _write(self, count: int) -> None:
         if not self._is_ours():
             return
-        values = self._values
         player = self._player
         sequence = player.sequence
-        words = sequence.words
-        if not (player.state == LOADING or (sequence.streams and (player.running or player.state == ARMED))):
-            self._not_ready()
+        if not (player.state == _LOADING or (sequence.streams and (player.running or player.state == _ARMED))):
+            self._refuse_for_now()
             return
+        words = sequence.words
         records = count // words
         if records == 0 or records * words != count:
             most = _WORDS_MAX // words * words
-            self._refuse(
-                errors.WRONG_LENGTH, 0, _WRITE_HEAD + 2 * count, _WRITE_HEAD + 2 * words, _WRITE_HEAD + 2 * most
-            )
+            size = _WRITE_HEAD + 2 * count
+            self._refuse(_WRONG_LENGTH, 0, size, _WRITE_HEAD + 2 * words, _WRITE_HEAD + 2 * most)
             return
-        expected = sequence.received & 0xFFFF
-        if values[1] != expected:
-            if values[1] + records & 0xFFFF != expected:
-                self._refuse(errors.OUT_OF_ORDER, 1, values[1], expected, expected)
-                return
-        elif records > sequence.free:
-            self._refuse(errors.NO_ROOM, 2, records, 0, sequence.free)
-            return
-        else:
-            flaw = sequence.write(values, 2, records)
-            if flaw >= 0:
-                check = sequence.check
-                word = flaw & 255
-                self._session._refuse(
-                    errors.BAD_LOOP if word == steps.LOOP else errors.BAD_STEP,
-                    word,
-                    flaw >> 8,
-                    check[steps.ASKED],
-                    check[steps.LOW],
-                    check[steps.HIGH],
-                )
-                return
-        values[0] = self._app.ticks
-        values[1] = sequence.free
-        values[2] = sequence.received
-        self._session._reply(0)
+        if self._take(records):
+            values = self._reply.values
+            values[_WRITTEN_TICKS] = self._clock.ticks
+            values[_WRITTEN_FREE] = sequence.free
+            values[_WRITTEN_RECEIVED] = sequence.received
+            self._reply.reply(0)
 
-    def _arm(self, count):
+    def _take(self, records: int) -> bool:
+        """Take so many records, once, if they are the next ones and sound; refuses where they are not."""
+        sequence = self._player.sequence
+        values = self._reply.values
+        first = values[_WRITE_FIRST]
+        expected = sequence.received & 0xFFFF
+        if first != expected:
+            if first + records & 0xFFFF == expected:  # they have been taken already
+                return True
+            self._refuse(_OUT_OF_ORDER, _WRITE_FIRST, first, expected, expected)
+            return False
+        if records > sequence.free:
+            self._refuse(_NO_ROOM, _WRITE_WORD, records, 0, sequence.free)
+            return False
+        invalid = sequence.write(values, _WRITE_WORD, records)
+        if invalid < 0:
+            return True
+        check = sequence.check
+        word = invalid & 255
+        error = _BAD_LOOP if word == _LOOP else _BAD_STEP
+        self._reply.refuse(error, word, invalid >> 8, check[_ASKED], check[_LOW], check[_HIGH])
+        return False
+
+    def _arm(self, count: int) -> None:
         if not self._is_ours():
             return
         player = self._player
         sequence = player.sequence
-        again = player.state == ENDED and not sequence.streams
-        if not (player.state == LOADING or player.state == ARMED or again) or not sequence.whole:
-            self._not_ready()
+        again = player.state == _ENDED and not sequence.streams
+        if not (player.state == _LOADING or player.state == _ARMED or again) or not sequence.complete:
+            self._refuse_for_now()
         elif not sequence.streams and not steps.has_crc(sequence.check, self._crc, 0):
-            self._refuse(errors.BAD_CRC, 0, 0, 0, 0)
+            self._refuse(_BAD_CRC, 0, 0, 0, 0)
         else:
             player.arm()
-            self._session._acknowledge()
+            self._reply.acknowledge()
 
-    def _start(self, count):
+    def _start(self, count: int) -> None:
         if not self._is_ours():
             return
-        app = self._app
         player = self._player
-        if player.state != ARMED:
+        faults = self._faults.board
+        if player.state != _ARMED:
             if player.running:  # asked again, because the reply was lost
-                self._started()
+                self._tell_start()
             else:
-                self._not_ready()
+                self._refuse_for_now()
             return
-        if app.faults & faults.VENTING:
-            self._refuse(errors.BOARD_FAULT, 0, app.faults, 0, 0)
+        if faults & _VENTING_FAULTS:
+            self._refuse(_BOARD_FAULT, 0, faults, 0, 0)
             return
-        tick = steps.small(self._values, 1)
-        soonest = app.ticks + 1
+        tick = steps.small_word(self._reply.values, _START_START_TICKS)
+        soonest = self._clock.ticks + 1
         if tick == 0:
             tick = soonest
         if tick < soonest:
-            self._refuse(errors.TOO_LATE, 1, tick, soonest, 0)
+            self._refuse(_TOO_LATE, _START_START_TICKS, tick, soonest, 0)
             return
         player.start_at(tick)
-        self._started()
+        self._tell_start()
 
-    def _started(self):
-        self._values[0] = self._app.ticks
-        self._values[1] = self._player.start
-        self._session._reply(0)
+    def _tell_start(self) -> None:
+        values = self._reply.values
+        values[_STARTED_TICKS] = self._clock.ticks
+        values[_STARTED_START_TICKS] = self._player.start
+        self._reply.reply(0)
 
-    def _control(self, count):
+    def _control(self, count: int) -> None:
         if not self._is_ours():
             return
         player = self._player
-        action = self._values[1]
-        if action == sequences.END:
+        action = self._reply.values[_CONTROL_ACTION]
+        if action == _ACTION_END:
             if player.running:
-                self._app.stop()
-        elif player.state != PLAYING and player.state != PAUSED:
-            self._not_ready()
+                self._commands.stop()
+        elif player.state != _PLAYING and player.state != _PAUSED:
+            self._refuse_for_now()
             return
-        elif action == sequences.PAUSE:
+        elif action == _ACTION_PAUSE:
             player.pause()
         else:
             player.resume()
-        self._session._acknowledge()
+        self._reply.acknowledge()
 
-    def _state(self, count):
-        values = self._values
+    def _tell_state(self, count: int) -> None:
+        values = self._reply.values
         player = self._player
         sequence = player.sequence
-        values[0] = self._app.ticks
-        values[1] = player.id
-        values[2] = player.state
-        values[3] = player.reason
-        values[4] = player.record
-        values[5] = player.begun
-        values[6] = player.unsettled
-        values[7] = player.timeouts
-        values[8] = sequence.received
-        values[9] = sequence.free
-        values[10] = sequence.capacity
-        self._session._reply(0)
+        values[_STATE_TICKS] = self._clock.ticks
+        values[_STATE_SEQUENCE] = player.id
+        values[_STATE_STATE] = player.state
+        values[_STATE_REASON] = player.reason
+        values[_STATE_RECORD] = player.record
+        values[_STATE_BEGUN_TICKS] = player.begun
+        values[_STATE_UNSETTLED] = player.unsettled
+        values[_STATE_TIMEOUTS] = player.timeouts
+        values[_STATE_RECEIVED] = sequence.received
+        values[_STATE_FREE] = sequence.free
+        values[_STATE_CAPACITY] = sequence.capacity
+        self._reply.reply(0)

@@ -1,99 +1,94 @@
-"""Requests that keep things: STORE_SAVE, STORE_INFO, STORE_RESET, TRIM_WRITE, TRIM_READ.
+"""Requests that keep things: STORE_SAVE, STORE_INFO, STORE_RESET.
 
 Flash is written only while the bubbles are vented: an erase stops everything, interrupts too, for 45 ms, 400 ms at worst.
 """
 
-from bubble_firmware.control.trim import COUNT
-from bubble_protocol.schema import errors, messages, system
-from bubble_protocol.schema.modes import IDLE
+from bubble_firmware.handlers.vented import is_vented
+from bubble_firmware.link.reply import Handlers
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
-_NO_ELEMENT = 255
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bubble_firmware.board_state import BoardState
+    from bubble_firmware.hal.base import Hal
+    from bubble_firmware.link.reply import Reply
+    from bubble_firmware.store.slots import Store
+
+# [constants] bubble_protocol.schema.messages: STORE_INFO STORE_RESET STORE_SAVE
+# [constants] bubble_protocol.schema.errors: NO_ELEMENT
+# [constants] bubble_protocol.schema.system: STORE as CAN_STORE
+# [constants] message STORE_INFO_REPLY as STORE: *
+_STORE_INFO = const(23)
+_STORE_RESET = const(24)
+_STORE_SAVE = const(22)
+_NO_ELEMENT = const(255)
+_CAN_STORE = const(4)
+_STORE_SOURCE = const(0)
+_STORE_GENERATION = const(1)
+_STORE_SCHEMA = const(2)
+_STORE_SLOT_A = const(3)
+_STORE_SLOT_B = const(4)
+_STORE_WEAR_A = const(5)
+_STORE_WEAR_B = const(6)
+_STORE_SIZE = const(7)
+_STORE_CAPACITY = const(8)
+_STORE_TABLES_CRC = const(9)
+_STORE_ERROR = const(10)
+# [end of constants]
 
 
-class StoreRequests:
-    """The handlers of `session` for the store and the figures of `app`."""
+class StoreHandlers(Handlers):
+    """The store of a board."""
 
-    def __init__(self, app, session):
-        self._app = app
-        self._session = session
-        session.capabilities |= system.STORE
-        session.serve(
-            {
-                messages.STORE_SAVE: self._save,
-                messages.STORE_INFO: self._info,
-                messages.STORE_RESET: self._reset,
-                messages.TRIM_WRITE: self._figures_write,
-                messages.TRIM_READ: self._figures_read,
-            }
-        )
+    capabilities = _CAN_STORE
 
-    def _save(self, count):
-        if self._vented():
-            self._answer(self._pause() and self._app.store.save())
+    def __init__(self, reply: "Reply", hal: "Hal", state: "BoardState", store: "Store"):
+        self._reply = reply
+        self._hal = hal
+        self._state = state
+        self._store = store
 
-    def _reset(self, count):
-        if self._vented():
-            self._answer(self._pause() and self._app.store.reset())
+    def requests(self) -> "dict[int, Callable[[int], None]]":
+        """See `Handlers`."""
+        return {_STORE_SAVE: self._save, _STORE_INFO: self._info, _STORE_RESET: self._reset}
 
-    def _info(self, count):
+    def _save(self, count: int) -> None:
+        if is_vented(self._reply, self._state.safety):
+            self._answer(self._pause() and self._store.save())
+
+    def _reset(self, count: int) -> None:
+        if is_vented(self._reply, self._state.safety):
+            self._answer(self._pause() and self._store.reset())
+
+    def _info(self, count: int) -> None:
         self._answer(True)
 
-    def _figures_write(self, count):
-        app = self._app
-        session = self._session
-        values = session._values
-        if count != app.board.BUBBLES:
-            session._refuse(errors.WRONG_COUNT, 0, _NO_ELEMENT, count, app.board.BUBBLES, app.board.BUBBLES)
-            return
-        if not self._vented():
-            return
-        flaw = app.figures.first_flaw(values)
-        if flaw >= 0:
-            number = flaw % COUNT
-            low = app.figures.low[number]
-            session._refuse(errors.OUT_OF_RANGE, number, flaw // COUNT, values[flaw], low, app.figures.high[number])
-            return
-        app.figures.use(values)
-        session._acknowledge()
-
-    def _figures_read(self, count):
-        self._app.figures.read(self._session._values)
-        self._session._reply(self._app.board.BUBBLES)
-
-    def _vented(self):
-        """Whether all bubbles are vented; refuses where they are not."""
-        safety = self._app.safety
-        if safety.control_mode == IDLE:
-            return True
-        self._session._refuse(errors.NOT_VENTED, 0, _NO_ELEMENT, safety.mode, IDLE, IDLE)
-        return False
-
-    def _pause(self):
+    def _pause(self) -> bool:
         """Bring all outputs to where they may stay for as long as flash takes; False where there is no flash."""
-        app = self._app
-        if not app.store.capacity:
+        if not self._store.capacity:
             return False
-        app.self_test.skip()
-        app.hands.vent()  # the pump, too
-        app.hands.slack()
+        self._state.self_test.skip()
+        self._hal.safe_outputs()  # the pump, too
+        self._hal.allow_overrun()
         return True
 
-    def _answer(self, done):
-        store = self._app.store
-        session = self._session
+    def _answer(self, done: bool) -> None:
+        store = self._store
         if not done:
-            session._refuse(store.error, 0, _NO_ELEMENT, store.states[0] | store.states[1] << 8, 0, 0)
+            states = store.states[0] | store.states[1] << 8
+            self._reply.refuse(store.error, 0, _NO_ELEMENT, states, 0, 0)
             return
-        values = session._values
-        values[0] = store.source
-        values[1] = store.generation
-        values[2] = store.schema
-        values[3] = store.states[0]
-        values[4] = store.states[1]
-        values[5] = store.wear[0]
-        values[6] = store.wear[1]
-        values[7] = store.length
-        values[8] = store.capacity
-        values[9] = store.tables_crc
-        values[10] = store.error
-        session._reply(0)
+        values = self._reply.values
+        values[_STORE_SOURCE] = store.source
+        values[_STORE_GENERATION] = store.generation
+        values[_STORE_SCHEMA] = store.schema
+        values[_STORE_SLOT_A] = store.states[0]
+        values[_STORE_SLOT_B] = store.states[1]
+        values[_STORE_WEAR_A] = store.wear[0]
+        values[_STORE_WEAR_B] = store.wear[1]
+        values[_STORE_SIZE] = store.length
+        values[_STORE_CAPACITY] = store.capacity
+        values[_STORE_TABLES_CRC] = store.tables_crc
+        values[_STORE_ERROR] = store.error
+        self._reply.reply(0)

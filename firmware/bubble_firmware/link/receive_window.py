@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """What makes every request count once: its session, its turn, and the replies kept for those that come again.
 
 Frames of another boot or another session are no frames here: their CRC is mixed with another key. Within a
@@ -8,9 +8,13 @@ comes again is answered from the replies kept, and not run again.
 
 from array import array
 
+from bubble_protocol.buffers import copy
 from bubble_protocol.crc import crc32_into
-from bubble_protocol.frame import CRC, FRAME_MAX, NO_KEY, copy
-from bubble_protocol.mpy_compat import const, micropython, ptr8
+from bubble_protocol.frame import CRC, FRAME_MAX, NO_KEY
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr8
+
+if TYPE_CHECKING:
+    from bubble_protocol.mpy_compat import Buffer
 
 WINDOW = const(8)
 """Requests that may be under way at once; as many slots for those that come too early."""
@@ -20,10 +24,11 @@ KEPT = const(16)
 
 _SESSIONS = const(64)  # bytes: the last sixteen sessions
 
-SAME = const(0)
-STALE = const(1)
+# What `open` says of a session.
+SAME = const(0)  # it is open already
+STALE = const(1)  # it was open before the one that is
 OPENED = const(2)
-NO_SESSION = const(3)
+NO_SESSION = const(3)  # its number is 0
 
 
 @micropython.viper
@@ -42,10 +47,10 @@ def _find(words: ptr8, end: int, word: ptr8, at: int) -> int:
     return -1
 
 
-class Delivery:
+class ReceiveWindow:
     """The open session of this boot; `boot_id` is an integer of 32 bits. `open` and `advance` are all that changes it."""
 
-    def __init__(self, boot_id):
+    def __init__(self, boot_id: int):
         self.key = bytearray(CRC)
         self.expected = 1  # the number whose turn it is, 16 bits
         self.early = 0  # how many requests wait for their turn
@@ -58,8 +63,8 @@ class Delivery:
         self._sizes = bytearray(WINDOW)  # 0: empty
         self._begin()
 
-    def open(self, word, at):
-        """Take up the session whose number is `word[at:at + 4]`: SAME as is open, STALE, OPENED, or NO_SESSION."""
+    def open(self, word: "Buffer", at: int) -> int:
+        """Take up the session whose number is `word[at:at + 4]`: SAME, STALE, OPENED, or NO_SESSION."""
         if _find(NO_KEY, 4, word, at) == 0:
             return NO_SESSION
         place = _find(self._sessions, _SESSIONS, word, at)
@@ -71,7 +76,7 @@ class Delivery:
         self._begin()
         return OPENED
 
-    def _begin(self):
+    def _begin(self) -> None:
         crc32_into(self._identity, 0, 8, self.key, 0)
         self.expected = 1
         self.early = 0
@@ -80,7 +85,7 @@ class Delivery:
         for index in range(KEPT):
             self.lengths[index] = 0
 
-    def advance(self):
+    def advance(self) -> None:
         """The number whose turn it is has had it: applied, or overtaken."""
         expected = self.expected
         slot = expected % WINDOW
@@ -90,18 +95,18 @@ class Delivery:
         self.lengths[expected % KEPT] = 0
         self.expected = (expected + 1) & 0xFFFF
 
-    def keep(self, sequence, frame, length):
+    def keep(self, number: int, frame: bytearray, length: int) -> None:
         """Keep a decoded request, `length` bytes from its id on, until its turn comes."""
-        slot = sequence % WINDOW
+        slot = number % WINDOW
         if not self._sizes[slot]:
             self._sizes[slot] = length
             self.early += 1
             copy(frame, 1, 1 + length, self._slots[slot], 1)
 
-    def waiting(self):
+    def waiting(self) -> int:
         """The length of the request whose turn it is, 0 where it has not come. It is `slot()`."""
         return self._sizes[self.expected % WINDOW]
 
-    def slot(self):
+    def slot(self) -> bytearray:
         """The frame of the request whose turn it is."""
         return self._slots[self.expected % WINDOW]

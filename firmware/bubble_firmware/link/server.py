@@ -1,296 +1,193 @@
-"""The device's end of the link: understands requests, checks them, answers each once, sends telemetry.
+"""The device's end of the link: finds requests in bytes, sees to their order, checks them and calls their handlers.
 
 It trusts nobody: lengths, limits and counts are checked here whatever the host has checked. It holds no
 buffer that grows and allocates nothing in steady state.
 """
 
-from array import array
-
-from bubble_firmware.handlers.care import Care
-from bubble_firmware.handlers.requests import NO_ELEMENT, Requests
-from bubble_firmware.link import receive_window
+from bubble_firmware.link.receive_window import ReceiveWindow
+from bubble_firmware.link.reply import Reply
+from bubble_firmware.link.sender import Sender
 from bubble_firmware.link.telemetry import Telemetry
 from bubble_protocol import codec
-from bubble_protocol.crc import crc32_into, crc32_word
-from bubble_protocol.frame import FRAME_MAX, HEADER, PAYLOAD_MAX, Decoder, finish_frame, put_header
-from bubble_protocol.mpy_compat import const, heap_free
-from bubble_protocol.schema import errors, messages, system
-from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
+from bubble_protocol.crc import crc32_into
+from bubble_protocol.frame import HEADER, PAYLOAD_MAX, Decoder
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
-_CHUNK = 256  # bytes taken from the link in one tick
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+    from bubble_firmware.board_state import BoardState
+    from bubble_firmware.control.bubbles import Bubbles
+    from bubble_firmware.hal.base import Hal
+    from bubble_firmware.link.reply import Handlers
+
+# [constants] bubble_protocol.schema.messages: HELLO PING STOP VENT
+# [constants] bubble_protocol.schema.errors: FAULTED NO_ELEMENT OUT_OF_RANGE OVERTAKEN UNKNOWN_MESSAGE WRONG_LENGTH
+# [constants] bubble_firmware.link.receive_window: KEPT OPENED WINDOW
+_HELLO = const(1)
+_PING = const(2)
+_STOP = const(11)
+_VENT = const(12)
+_FAULTED = const(8)
+_NO_ELEMENT = const(255)
+_OUT_OF_RANGE = const(3)
+_OVERTAKEN = const(10)
+_UNKNOWN_MESSAGE = const(1)
+_WRONG_LENGTH = const(2)
+_KEPT = const(16)
+_OPENED = const(2)
+_WINDOW = const(8)
+# [end of constants]
+
+_CHUNK = const(256)  # bytes taken from the link in one tick
 _PAYLOAD_AT = Decoder.PAYLOAD_AT
-_BUDGET = 2  # requests handled in one tick, of nearly 1 ms each on the chip; one that takes long is worth as many
-_HELLO = const(0x01)
-_PING = const(0x02)
-_STOP = const(0x0B)
-_VENT = const(0x0C)
+_BUDGET = const(2)  # requests handled in one tick, of nearly 1 ms each on the chip; one that is slow is worth as many
 
 
-class Session(Requests):
-    """Requests in, replies and telemetry out, for one `App`."""
+class Server:
+    """Requests in, replies and telemetry out. `register` handlers; call `poll` in every tick.
 
-    def __init__(self, app):
-        self._app = app
-        self._delivery = receive_window.Delivery(app.hands.boot_id & 0xFFFFFFFF)
-        self._decoder = Decoder(crc32_into, self._delivery.key)
+    `capabilities`: what the handlers registered can do, bits of the schema. `reply` is what handlers answer with, `sender`
+    what sends other messages. `decoder` counts frames, `window` knows whose turn it is.
+    """
+
+    def __init__(self, board: "ModuleType", hal: "Hal", state: "BoardState", bubbles: "Bubbles"):
+        self._hal = hal
+        self._deadman = state.deadman
+        self.window = ReceiveWindow(hal.boot_id & 0xFFFFFFFF)
+        self.decoder = Decoder(crc32_into, self.window.key)
+        self.sender = Sender(hal, self.window)
+        self.reply = Reply(self.sender, state.clock)
+        self.telemetry = Telemetry(board, state, bubbles, self.sender)
+        self.capabilities = 0
         self._chunk = bytearray(_CHUNK)
-        self._frame = bytearray(FRAME_MAX)  # what is sent and not kept
-        self._values = array("i", bytearray(4 * PAYLOAD_MAX))
-        self._handling = 0  # id of the request being handled; 0 once it is answered
-        self._sequence = 0  # its number
-        self._ordered = False  # whether its reply is kept
         self._budget = 0
-        self._owed = 0  # how many of the last replies have found no room yet
-        self._telemetry = Telemetry(app)
-        self.heard = 0  # frames of the open session since boot, modulo 65536: the host is alive
-        self.capabilities = system.DELIVERY | system.SAFETY | system.CAN_CHOOSE_TELEMETRY
-        self._heap_free = heap_free()
-        schema = codec.schema_bytes()
-        self._schema_crc = crc32_word(schema, 0, len(schema))
-        self._name = (app.board.NAME.encode() + bytes(16))[:16]  # bytes: a letter of a string can be an allocation
-        boot_id = app.hands.boot_id & 0xFFFFFFFF
-        self._boot_id = boot_id - (boot_id >> 31 << 32)  # the same 32 bits as a signed word
-        self._requests = self._handlers()
-        self._requests[messages.HELLO] = self._hello
-        self._requests[messages.SUBSCRIBE] = self._subscribe
-        self._requests[messages.SUBSCRIBE_FIELDS] = self._subscribe_fields
-        self._slow = {messages.TABLE_WRITE, messages.TABLE_COMMIT, messages.TABLE_READ, messages.TICKS}
-        self.serve(Care(app, self).handlers())
+        self._handlers: "dict[int, Callable[[int], None]]" = {}
+        self._slow: "set[int]" = set()
 
-    def serve(self, handlers):
-        """Let others handle requests: functions of the count of repetitions, by message id."""
-        self._requests.update(handlers)
+    def register(self, handlers: "Handlers") -> None:
+        """Let these handle their requests."""
+        self._handlers.update(handlers.requests())
+        self.capabilities |= handlers.capabilities
+        self._slow.update(handlers.slow)
 
-    def poll(self):
+    def poll(self) -> None:
         """Once a tick: handle what has come; send telemetry when it is due."""
         self.listen()
-        if self._telemetry.is_due():
-            self._tell()
+        self.telemetry.tick()
 
-    def listen(self):
+    def listen(self) -> None:
         """Handle what has come."""
-        if self._owed:
-            self._pay()
+        if self.sender.unsent:
+            self.sender.flush()
         chunk = self._chunk
-        decoder = self._decoder
-        kept = self._delivery
+        decoder = self.decoder
+        window = self.window
         self._budget = _BUDGET
-        end = self._app.hands.receive(chunk)
+        end = self._hal.receive(chunk)
         at = 0
         while at < end:
             at = decoder.feed(chunk, at, end)
             if decoder.length:
-                self._arrive(decoder.message_id, decoder.sequence)
-        while kept.early and self._budget > 0:
-            length = kept.waiting()
+                self.take(decoder.message_id, decoder.sequence)
+        while window.early and self._budget > 0:
+            length = window.waiting()
             if not length:
                 break
-            self._apply(kept.slot(), length)
+            self._handle_next(window.slot(), length)
 
-    def send_unasked(self, message_id, sequence, count):
-        """Send the message whose fields stand in `_values`; whether there was room."""
-        if self._owed:  # a reply comes first
-            return False
-        return self._app.hands.send(self._frame, self._pack(self._frame, message_id, sequence, count))
+    def open(self, at: int) -> int:
+        """Open the session whose number stands at byte `at` of the frame in the decoder; see `ReceiveWindow.open`."""
+        opened = self.window.open(self.decoder.frame, at)
+        if opened == _OPENED:
+            self.sender.unsent = 0
+            self.telemetry.subscribe(0, 0)  # a new host has not subscribed
+        return opened
 
-    def fail(self):
+    def fail(self) -> None:
         """Tell the host whose request was being handled that the device failed at it: once, if the link still works."""
-        if self._handling:
+        if self.reply.request:
             try:
-                self._refuse(errors.FAULTED, 0, NO_ELEMENT, 0, 0, 0)
+                self.reply.refuse(_FAULTED, 0, _NO_ELEMENT, 0, 0, 0)
             except Exception:
                 pass
-            self._handling = 0
+            self.reply.request = 0
 
     # Whose turn it is.
 
-    def _arrive(self, message_id, sequence):
+    def take(self, message_id: int, number: int) -> None:
         """A frame stands in the decoder. HELLO and PING know no order, STOP and VENT overtake it."""
-        decoder = self._decoder
-        kept = self._delivery
-        if message_id == _HELLO:
-            self._answer_aside(message_id, sequence)
+        decoder = self.decoder
+        window = self.window
+        if message_id == _HELLO or message_id == _PING:
+            self.reply.begin(message_id, number, False)
+            self._handle(message_id, decoder.frame, decoder.length - HEADER)
             return
-        self.heard = (self.heard + 1) & 0xFFFF
-        if message_id == _PING:
-            self._answer_aside(message_id, sequence)
-            return
-        ahead = (sequence - kept.expected) & 0xFFFF
-        if ahead >= 0x10000 - receive_window.KEPT:
-            self._answer_again(message_id, sequence)
-        elif ahead < receive_window.KEPT and (message_id == _STOP or message_id == _VENT):
-            if self._owed:
-                self._owed += ahead
-            while ahead:
-                kept.advance()
-                ahead -= 1
-            self._apply(decoder.frame, decoder.length)
+        ahead = (number - window.expected) & 0xFFFF
+        if ahead >= 0x10000 - _KEPT:
+            self._answer_again(message_id, number)
+        elif ahead < _KEPT and (message_id == _STOP or message_id == _VENT):
+            self._overtake(ahead)
+            self._handle_next(decoder.frame, decoder.length)
         elif ahead == 0 and self._budget > 0:
-            self._apply(decoder.frame, decoder.length)
-        elif ahead < receive_window.WINDOW:
-            kept.keep(sequence, decoder.frame, decoder.length)
+            self._handle_next(decoder.frame, decoder.length)
+        elif ahead < _WINDOW:
+            window.keep(number, decoder.frame, decoder.length)
 
-    def _apply(self, frame, length):
+    def _overtake(self, requests: int) -> None:
+        """So many requests will never be handled, nor answered unless they come again."""
+        if self.sender.unsent:
+            self.sender.unsent += requests
+        while requests:
+            self.window.advance()
+            requests -= 1
+
+    def _handle_next(self, frame: bytearray, length: int) -> None:
         """Handle the request whose turn it is."""
         message_id = frame[1]
         self._budget -= _BUDGET if message_id in self._slow else 1
-        self._sequence = self._delivery.expected
-        self._delivery.advance()
-        self._ordered = True
+        self.reply.begin(message_id, self.window.expected, True)
+        self.window.advance()
         self._handle(message_id, frame, length - HEADER)
 
-    def _answer_aside(self, message_id, sequence):
-        decoder = self._decoder
-        self._sequence = sequence
-        self._ordered = False
-        self._handle(message_id, decoder.frame, decoder.length - HEADER)
-
-    def _answer_again(self, message_id, sequence):
+    def _answer_again(self, message_id: int, number: int) -> None:
         """A request that has had its turn: its reply once more, or that it was overtaken."""
-        kept = self._delivery
-        place = sequence % receive_window.KEPT
-        if kept.lengths[place]:
-            self._app.hands.send(kept.replies[place], kept.lengths[place])
-        else:
-            self._handling = message_id
-            self._sequence = sequence
-            self._ordered = False
-            self._refuse(errors.OVERTAKEN, 0, NO_ELEMENT, 0, 0, 0)
+        if not self.sender.repeat(number):
+            self.reply.begin(message_id, number, False)
+            self.reply.refuse(_OVERTAKEN, 0, _NO_ELEMENT, 0, 0, 0)
 
     # Whether it can be meant.
 
-    def _handle(self, message_id, frame, size):
-        self._handling = message_id
-        self._app.heard()
-        handler = self._requests.get(message_id)
+    def _handle(self, message_id: int, frame: bytearray, size: int) -> None:
+        reply = self.reply
+        self._deadman.host_activity()
+        handler = self._handlers.get(message_id)
         if handler is None:
-            self._refuse(errors.UNKNOWN_MESSAGE, 0, NO_ELEMENT, message_id, 0, 0)
+            reply.refuse(_UNKNOWN_MESSAGE, 0, _NO_ELEMENT, message_id, 0, 0)
             return
         message = codec.BY_ID[message_id]
-        count = message.unpack(frame, _PAYLOAD_AT, size, self._values)
+        count = message.unpack(frame, _PAYLOAD_AT, size, reply.values)
         if count < 0:
-            self._refuse(errors.WRONG_LENGTH, 0, NO_ELEMENT, size, message.least, PAYLOAD_MAX)
+            reply.refuse(_WRONG_LENGTH, 0, _NO_ELEMENT, size, message.size_min, PAYLOAD_MAX)
         elif self._within_limits(message, count):
             handler(count)
-        self._handling = 0
+        reply.request = 0
 
-    def _within_limits(self, message, count):
+    def _within_limits(self, message: "codec.Message", count: int) -> bool:
         """Whether all values are within the schema's limits; refuses where one is not."""
-        at = message.first_out_of_range(self._values, count)
+        values = self.reply.values
+        at = message.first_out_of_range(values, count)
         if at < 0:
             return True
         fixed = len(message.fixed)
         number = at
-        element = NO_ELEMENT
+        element = _NO_ELEMENT
         if at >= fixed:
             number = fixed + (at - fixed) % message.stride_values
             element = (at - fixed) // message.stride_values
         field = (message.fixed + message.repeated)[number]
         low = field[3]
         high = field[4]
-        self._refuse(errors.OUT_OF_RANGE, number, element, self._values[at], low or 0, 65535 if high is None else high)
+        self.reply.refuse(_OUT_OF_RANGE, number, element, values[at], low or 0, 65535 if high is None else high)
         return False
-
-    # The link's own requests; the others are in `requests`.
-
-    def _hello(self, count):
-        values = self._values
-        board = self._app.board
-        if values[0] > PROTOCOL_MAX or values[1] < PROTOCOL_MIN:
-            self._refuse(errors.NO_COMMON_PROTOCOL, 1, NO_ELEMENT, values[1], PROTOCOL_MIN, PROTOCOL_MAX)
-            return
-        opened = self._delivery.open(self._decoder.frame, _PAYLOAD_AT + 2)
-        if opened == receive_window.NO_SESSION:
-            self._refuse(errors.OUT_OF_RANGE, 2, NO_ELEMENT, 0, 1, 0x3FFFFFFF)
-            return
-        if opened == receive_window.STALE:
-            self._refuse(errors.OVERTAKEN, 2, NO_ELEMENT, 0, 0, 0)
-            return
-        if opened == receive_window.OPENED:
-            self._owed = 0
-            self._telemetry.subscribe(0, 0)  # a new host has not subscribed
-        self.heard = (self.heard + 1) & 0xFFFF
-        values[0] = PROTOCOL_MIN
-        values[1] = PROTOCOL_MAX
-        values[2] = self._schema_crc
-        values[3] = self._boot_id
-        values[4], values[5], values[6] = FIRMWARE
-        for index in range(16):
-            values[7 + index] = self._name[index]
-        values[23] = board.BUBBLES
-        values[24] = board.TICK_US
-        values[25] = board.HEIGHT_REST_UM
-        values[26] = board.HEIGHT_MAX_UM
-        values[27] = board.PRESSURE_MAX_PA
-        values[28] = receive_window.WINDOW
-        values[29] = self.capabilities
-        values[30] = self._app.tables.crc
-        self._reply(0)
-
-    def _subscribe(self, count):
-        self._telemetry.subscribe(self._values[0], 0)
-        self._acknowledge()
-
-    def _subscribe_fields(self, count):
-        telemetry = self._telemetry
-        if telemetry.subscribe(self._values[0], self._values[1]):
-            self._acknowledge()
-        else:  # the limit is one of how many, not of which
-            self._refuse(errors.OUT_OF_RANGE, 1, NO_ELEMENT, self._values[1], 1, (1 << telemetry.most) - 1)
-
-    # Sending.
-
-    def _acknowledge(self):
-        self._values[0] = self._app.ticks
-        self._reply(0)
-
-    def _reply(self, count):
-        self._send(self._handling | messages.REPLY, count)
-
-    def _refuse(self, error, field, element, asked, low, high):
-        values = self._values
-        values[0] = self._handling
-        values[1] = error
-        values[2] = field
-        values[3] = element
-        values[4] = asked
-        values[5] = low
-        values[6] = high
-        self._send(messages.ERROR, 0)
-
-    def _send(self, message_id, count):
-        """Answer the request being handled, and keep the answer of one that has a turn."""
-        self._handling = 0
-        if self._ordered:
-            kept = self._delivery
-            place = self._sequence % receive_window.KEPT
-            kept.lengths[place] = self._pack(kept.replies[place], message_id, self._sequence, count)
-            self._owed += 1
-            self._pay()
-        else:
-            self._app.hands.send(self._frame, self._pack(self._frame, message_id, self._sequence, count))
-
-    def _pay(self):
-        """Send the replies that are owed, in order, as far as there is room."""
-        kept = self._delivery
-        if self._owed > receive_window.KEPT:
-            self._owed = receive_window.KEPT
-        while self._owed:
-            place = (kept.expected - self._owed) % receive_window.KEPT
-            if kept.lengths[place] and not self._app.hands.send(kept.replies[place], kept.lengths[place]):
-                return
-            self._owed -= 1
-
-    def _tell(self):
-        telemetry = self._telemetry
-        if self._owed:  # a reply comes first
-            telemetry.drop()
-            return
-        length = self._pack(self._frame, telemetry.message_id, telemetry.sequence, telemetry.fill(self._values))
-        if not self._app.hands.send(self._frame, length):
-            telemetry.drop()
-
-    def _pack(self, frame, message_id, sequence, count):
-        end = codec.BY_ID[message_id].pack(self._values, count, frame, _PAYLOAD_AT)
-        put_header(frame, message_id, sequence)
-        return finish_frame(frame, end - 1, crc32_into, self._delivery.key)

@@ -1,12 +1,37 @@
-"""What is sent unasked: when it is due, which columns, and what found no room."""
+"""Telemetry: what is subscribed to, when it is due, and what found no room."""
 
 from array import array
 
 from bubble_firmware.control import state_layout as layout
 from bubble_protocol import codec, frame
-from bubble_protocol.schema import messages
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
-_COLUMNS = (  # where each column stands in a bubble's row, and by how many bits it is shifted
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from bubble_firmware.board_state import BoardState
+    from bubble_firmware.control.bubbles import Bubbles
+    from bubble_firmware.link.sender import Sender
+
+# [constants] bubble_protocol.schema.messages: TELEMETRY TELEMETRY_FIELDS
+# [constants] message TELEMETRY as TELEMETRY: TICKS MODE HEIGHT_UM
+# [constants] message TELEMETRY_FIELDS as FIELDS: *
+_TELEMETRY = const(7)
+_TELEMETRY_FIELDS = const(28)
+_TELEMETRY_TICKS = const(0)
+_TELEMETRY_MODE = const(1)
+_TELEMETRY_HEIGHT_UM = const(2)
+_FIELDS_TICKS = const(0)
+_FIELDS_MODE = const(1)
+_FIELDS_BOARD_FAULTS = const(2)
+_FIELDS_SUPPLY_PA = const(3)
+_FIELDS_DROPPED = const(4)
+_FIELDS_FIELDS = const(5)
+_FIELDS_VALUE = const(6)
+_FIELDS_STRIDE = const(1)
+# [end of constants]
+
+_COLUMNS = (  # where each field stands in a bubble's row, and by how many bits it is shifted
     (layout.HEIGHT, 4),
     (layout.PRESSURE, 2),
     (layout.TARGET, 0),
@@ -16,73 +41,77 @@ _COLUMNS = (  # where each column stands in a bubble's row, and by how many bits
     (layout.FILL_US, 0),
     (layout.VENT_US, 0),
 )
+_SHIFTS = const(8)  # where in the plan the shifts begin
 
 
 class Telemetry:
-    """One subscription. `is_due` once per tick; then `fill` and send, or `drop` where there is no room."""
+    """One subscription. `most`: how many fields a frame has room for. `dropped`: what has found no room since boot."""
 
-    def __init__(self, app):
-        message = codec.BY_NAME["TELEMETRY_FIELDS"]
-        self._app = app
-        self._plan = array("i", bytearray(4 * 16))
-        self._columns = 0  # chosen; 0: TELEMETRY, with what it always has
-        self._fields = 0
-        self._fixed = message.fixed_values
+    def __init__(self, board: "ModuleType", state: "BoardState", bubbles: "Bubbles", sender: "Sender"):
+        message = codec.BY_ID[_TELEMETRY_FIELDS]
+        self.most = (frame.PAYLOAD_MAX - message.fixed_size) // (message.stride * board.BUBBLES)
+        self.dropped = 0
+        self._clock = state.clock
+        self._safety = state.safety
+        self._faults = state.faults
+        self._supply = state.supply
+        self._bubbles = bubbles
+        self._sender = sender
+        self._plan = array("i", bytearray(4 * 2 * _SHIFTS))
+        self._columns = 0  # how many fields are chosen
+        self._fields = 0  # those chosen, bits; 0: TELEMETRY, with what it always has
         self._period = 0  # ticks; 0: none
         self._wait = 0
-        self._dropped = 0
-        self.most = (frame.PAYLOAD_MAX - message.fixed_size) // (message.stride * app.board.BUBBLES)
-        self.dropped = 0  # since boot
-        self.sequence = 0
-        self.message_id = messages.TELEMETRY
+        self._dropped = 0  # since it was subscribed to
+        self._number = 0
 
-    def subscribe(self, period, fields):
-        """Send every `period` ticks: the columns `fields`, 0 for TELEMETRY's. False where a frame has no room for them."""
+    def subscribe(self, period: int, fields: int) -> bool:
+        """Send these `fields` every `period` ticks, TELEMETRY where they are 0. False where a frame has no room for them."""
         columns = 0
         for index in range(len(_COLUMNS)):
             if fields >> index & 1:
                 columns += 1
         if columns > self.most:
             return False
-        self._columns = self._fields = 0
+        columns = 0
         for index in range(len(_COLUMNS)):
             if fields >> index & 1:
-                self._plan[self._columns] = _COLUMNS[index][0]
-                self._plan[self._columns + 8] = _COLUMNS[index][1]
-                self._columns += 1
+                self._plan[columns] = _COLUMNS[index][0]
+                self._plan[columns + _SHIFTS] = _COLUMNS[index][1]
+                columns += 1
+        self._columns = columns
         self._fields = fields
         self._period = self._wait = period
         self._dropped = 0
-        self.sequence = 0
-        self.message_id = messages.TELEMETRY_FIELDS if fields else messages.TELEMETRY
+        self._number = 0
         return True
 
-    def is_due(self):
-        """Count one tick; whether telemetry is due in it."""
+    def tick(self) -> None:
+        """One period: send what is due, or drop it where there is no room."""
         if not self._period:
-            return False
+            return
         self._wait -= 1
         if self._wait > 0:
-            return False
+            return
         self._wait = self._period
-        self.sequence = (self.sequence + 1) & 0xFFFF
-        return True
+        self._number = (self._number + 1) & 0xFFFF
+        if self._sender.unsent or not self._send():
+            self.dropped += 1
+            self._dropped = (self._dropped + 1) & 0xFFFF
 
-    def drop(self):
-        """What was due found no room."""
-        self.dropped += 1
-        self._dropped = (self._dropped + 1) & 0xFFFF
-
-    def fill(self, values):
-        """The fields of TELEMETRY or TELEMETRY_FIELDS; returns the repetitions."""
-        app = self._app
-        values[0] = app.ticks
-        values[1] = app.mode
+    def _send(self) -> bool:
+        values = self._sender.values
+        bubbles = self._bubbles
         if not self._fields:
-            app.bubbles.pack_state(values, 2)
-            return app.bubbles.count
-        values[2] = app.faults
-        values[3] = app.supply.pressure_pa
-        values[4] = self._dropped
-        values[5] = self._fields
-        return app.bubbles.pack_fields(values, self._plan, self._fixed, self._columns)
+            values[_TELEMETRY_TICKS] = self._clock.ticks
+            values[_TELEMETRY_MODE] = self._safety.mode
+            bubbles.pack_state(values, _TELEMETRY_HEIGHT_UM)
+            return self._sender.send(_TELEMETRY, self._number, bubbles.count)
+        values[_FIELDS_TICKS] = self._clock.ticks
+        values[_FIELDS_MODE] = self._safety.mode
+        values[_FIELDS_BOARD_FAULTS] = self._faults.board
+        values[_FIELDS_SUPPLY_PA] = self._supply.pressure_pa
+        values[_FIELDS_DROPPED] = self._dropped
+        values[_FIELDS_FIELDS] = self._fields
+        count = bubbles.pack_fields(values, self._plan, _FIELDS_VALUE, self._columns)
+        return self._sender.send(_TELEMETRY_FIELDS, self._number, count)

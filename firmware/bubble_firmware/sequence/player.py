@@ -1,5 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
-"""A sequence of steps in memory, and the player that executes it on the device's own clock.
+"""The player: executes the sequence in memory on the device's own clock.
 
 Times in records are ms; the player counts whole ticks and carries what is left over to the next step, so that every
 step begins in the tick of its schedule, however many came before it. Memory is made once; playing allocates nothing.
@@ -7,126 +6,89 @@ step begins in the tick of its schedule, however many came before it. Memory is 
 
 from array import array
 
-from bubble_firmware.safety import state
+from bubble_firmware.sequence.memory import SequenceMemory, word
 from bubble_protocol import steps
-from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
-from bubble_protocol.schema.faults import VENTING
-from bubble_protocol.schema.modes import ACTIVE
-from bubble_protocol.schema.sequences import (
-    ARMED,
-    BY_SETTLING,
-    BY_TIME,
-    BY_TIMEOUT,
-    CANCELLED,
-    COMPLETE,
-    EMPTY,
-    ENDED,
-    LOADING,
-    PAUSED,
-    PLAYING,
-    SEQUENCE_ENDED,
-    SEQUENCE_PAUSED,
-    SEQUENCE_RESUMED,
-    STEP_BEGUN,
-    UNDERRUN,
-    UNENDED,
-    WAITING,
-)
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
-_NEWS = const(8)  # events that may wait for room on the link
-_FIELDS = const(6)  # of an event: ticks, sequence, event, reason, record, unsettled
-_WHOLE = const(32768)
-_PIECE = const(4096)  # bytes
+if TYPE_CHECKING:
+    from types import ModuleType
 
+    from bubble_firmware.board_state import BoardState
+    from bubble_firmware.control.bubbles import Bubbles
 
-@micropython.viper
-def _store(v: ptr32, w: ptr16, at: int, count: int, to: int):
-    end = at + count
-    while at < end:
-        w[to] = v[at]
-        at += 1
-        to += 1
+# [constants] bubble_protocol.steps: HEAD DEPTH_MAX ONE STEP REPEAT
+# [constants] bubble_protocol.steps: GO_ON as THEN_GO_ON
+# [constants] bubble_protocol.schema.faults: VENTING as VENTING_FAULTS
+# [constants] bubble_protocol.schema.modes: ACTIVE
+# [constants] bubble_protocol.schema.sequences: EMPTY LOADING ARMED WAITING PLAYING PAUSED ENDED
+# [constants] bubble_protocol.schema.sequences: UNENDED BY_TIME BY_SETTLING BY_TIMEOUT COMPLETE CANCELLED UNDERRUN
+# [constants] bubble_protocol.schema.sequences: STEP_BEGUN SEQUENCE_PAUSED SEQUENCE_RESUMED SEQUENCE_ENDED
+# [constants] bubble_firmware.safety.state: SHOW as EVENT_SHOW
+# [constants] message SEQUENCE_EVENT as EVENT: *
+_HEAD = const(4)
+_DEPTH_MAX = const(4)
+_ONE = const(32768)
+_STEP = const(0)
+_REPEAT = const(1)
+_THEN_GO_ON = const(0)
+_VENTING_FAULTS = const(135)
+_ACTIVE = const(1)
+_EMPTY = const(0)
+_LOADING = const(1)
+_ARMED = const(2)
+_WAITING = const(3)
+_PLAYING = const(4)
+_PAUSED = const(5)
+_ENDED = const(6)
+_UNENDED = const(0)
+_BY_TIME = const(1)
+_BY_SETTLING = const(2)
+_BY_TIMEOUT = const(3)
+_COMPLETE = const(4)
+_CANCELLED = const(5)
+_UNDERRUN = const(6)
+_STEP_BEGUN = const(0)
+_SEQUENCE_PAUSED = const(1)
+_SEQUENCE_RESUMED = const(2)
+_SEQUENCE_ENDED = const(3)
+_EVENT_SHOW = const(1)
+_EVENT_TICKS = const(0)
+_EVENT_SEQUENCE = const(1)
+_EVENT_EVENT = const(2)
+_EVENT_REASON = const(3)
+_EVENT_RECORD = const(4)
+_EVENT_UNSETTLED = const(5)
+_EVENT_FREE = const(6)
+# [end of constants]
 
-
-@micropython.viper
-def _word(w: ptr16, at: int) -> int:
-    return w[at]
-
-
-class Sequence:
-    """The records of one sequence: a program that is all there, or a stream that is written ahead of what is read."""
-
-    def __init__(self, board):
-        self.words = steps.HEAD + board.BUBBLES  # of a record
-        # In pieces, because a heap that compiles its own code has no large ones left; no arrays, for each would be
-        # made from a second one.
-        self.piece = _PIECE // (2 * self.words)  # records in each
-        self.memory = []
-        for _ in range(board.SEQUENCE_BYTES // _PIECE):
-            self.memory.append(bytearray(2 * self.piece * self.words))
-        self.capacity = len(self.memory) * self.piece
-        self.check = array("i", bytearray(4 * steps.CHECK))
-        self.check[steps.BUBBLES] = board.BUBBLES
-        self.check[steps.HEIGHT_MAX] = board.HEIGHT_MAX_UM
-        self.check[steps.TICK_US] = board.TICK_US
-        self.total = 0  # records in all; 0: a stream without end
-        self.received = 0
-        self.streams = False
-        self.next = 0  # record that will be read next
-
-    def begin(self, total):
-        """Await `total` records."""
-        self.total = total
-        self.received = 0
-        self.next = 0
-        self.streams = total == 0 or total > self.capacity
-        steps.restart(self.check, 0 if self.streams else 1)
-
-    @property
-    def free(self):
-        """Records that there is room for."""
-        room = self.capacity - self.received
-        if self.streams:
-            room += self.next
-        if self.total and room > self.total - self.received:
-            room = self.total - self.received
-        return room
-
-    def write(self, values, at, records):
-        """Take the records at `values[at:]`; the flaw of `steps.first_flaw` where one is not sound, then none is taken."""
-        flaw = steps.first_flaw(values, self.check, at, records)
-        if flaw < 0:
-            words = self.words
-            steps.accept(values, self.check, at, at + records * words)
-            for _ in range(records):
-                place = self.received % self.capacity
-                _store(values, self.memory[place // self.piece], at, words, place % self.piece * words)
-                self.received += 1
-                at += words
-        return flaw
-
-    @property
-    def whole(self):
-        """Whether it can be played: a program is all there and nested properly, a stream has filled the memory."""
-        if self.streams:
-            return self.received > 0 and self.free == 0
-        return self.received == self.total and self.check[steps.DEPTH] == 0
+_EVENTS = const(8)  # that may wait for room on the link
+_EVENT_FIELDS = const(_EVENT_FREE)  # of an event that is kept; what is free is known when it is sent
 
 
 class Player:
-    """Plays the sequence; `tick` while `running`. `read_news` gives what is to be told to the host."""
+    """Plays `sequence`. Call `tick` in every period while `running`.
 
-    def __init__(self, app):
-        self._app = app
-        self._tick_us = app.board.TICK_US
-        self.sequence = Sequence(app.board)
+    `id`: the host's number of the sequence. `state`, `reason`: see `sequences` in the schema. `start`: tick of the first
+    step. `record`: of the step being played; `begun`: the tick in which it began. `unsettled`: the bubbles, as bits, that its
+    timeout found elsewhere; `timeouts`: how many steps ended so. `events_waiting`: how many events are to be sent to the
+    host, of which the oldest has the number `event_number`.
+    """
+
+    def __init__(self, board: "ModuleType", state: "BoardState", bubbles: "Bubbles"):
+        self._tick_us = board.TICK_US
+        self._clock = state.clock
+        self._safety = state.safety
+        self._faults = state.faults
+        self._self_test = state.self_test
+        self._bubbles = bubbles
+        self.sequence = SequenceMemory(board)
         self.id = 0
-        self.state = EMPTY
-        self.reason = UNENDED
+        self.state = _EMPTY
+        self.reason = _UNENDED
         self.running = False
-        self.start = 0  # tick of the first step
-        self.record = 0  # the step being played
-        self.begun = 0  # tick in which it began; its beginning by the schedule is `_carry_us` later
+        self.start = 0
+        self.record = 0
+        self.begun = 0  # its beginning by the schedule is `_carry_us` later
         self.unsettled = 0
         self.timeouts = 0
         self._carry_us = 0
@@ -139,72 +101,95 @@ class Player:
         self._moving = False
         self._elapsed = 0  # ticks of the step when it was paused
         self._depth = 0
-        self._back = array("i", bytearray(4 * steps.DEPTH_MAX))  # first record within each repeat
-        self._left = array("i", bytearray(4 * steps.DEPTH_MAX))  # times that it will be played again; -1: for ever
-        self._news = array("i", bytearray(4 * _NEWS * _FIELDS))
+        self._back = array("i", bytearray(4 * _DEPTH_MAX))  # first record within each repeat
+        self._left = array("i", bytearray(4 * _DEPTH_MAX))  # times that it will be played again; -1: for ever
+        self._events = array("i", bytearray(4 * _EVENTS * _EVENT_FIELDS))
         self._oldest = 0
-        self.waiting_news = 0
-        self.number = 0  # of the oldest of them
+        self.events_waiting = 0
+        self.event_number = 0
 
-    def begin(self, number, total):
+    # What the host asks for.
+
+    def begin(self, number: int, total: int) -> None:
         """Make room for a sequence of `total` records. What runs is cancelled, and held where it is."""
         if self.running:
-            playing = self.state != WAITING
+            playing = self.state != _WAITING
             self.cancel()
             if playing:
-                self._app.bubbles.hold_position()
+                self._bubbles.hold_position()
         self.id = number
-        self.state = LOADING
-        self.reason = UNENDED
+        self.state = _LOADING
+        self.reason = _UNENDED
         self.unsettled = 0
         self.timeouts = 0
         self.record = 0
         self.sequence.begin(total)
 
-    def arm(self):
+    def arm(self) -> None:
         """The sequence may be started."""
-        self.state = ARMED
+        self.state = _ARMED
 
-    def start_at(self, tick):
+    def start_at(self, tick: int) -> None:
         """Begin the first step in that tick."""
         self.start = tick
-        self.state = WAITING
+        self.state = _WAITING
         self.running = True
 
-    def tick(self):
-        """One period, before anything of it has been decided."""
-        now = self._app.ticks
-        if self.state == WAITING:
+    def pause(self) -> None:
+        """Let time and setpoints stand still."""
+        if self.state == _PLAYING:
+            self._elapsed = self._clock.ticks - self.begun
+            self.state = _PAUSED
+            self._keep_event(_SEQUENCE_PAUSED, _UNENDED, self._clock.ticks)
+
+    def resume(self) -> None:
+        """Let time go on from where it stood still."""
+        if self.state == _PAUSED:
+            self.begun = self._clock.ticks - self._elapsed
+            self.state = _PLAYING
+            self._keep_event(_SEQUENCE_RESUMED, _UNENDED, self._clock.ticks)
+
+    def cancel(self) -> None:
+        """Something else decides from now on where the bubbles go."""
+        if self.running:
+            self._end(_CANCELLED, self._clock.ticks)
+
+    # A period.
+
+    def tick(self) -> int:
+        """One period, before anything of it has been decided. What the sequence wants done at its end: see `steps.GO_ON`."""
+        now = self._clock.ticks
+        if self.state == _WAITING:
             if now < self.start:
-                return
+                return _THEN_GO_ON
             self._open()
             if not self.running:
-                return
-        elif self.state == PAUSED:
+                return _THEN_GO_ON
+        elif self.state == _PAUSED:
             self.begun = now - self._elapsed
         elapsed = now - self.begun
-        if self.state == PLAYING:
+        if self.state == _PLAYING:
             reason = self._over(elapsed)
             while reason:
                 self._next(reason)
-                if self.state != PLAYING:
-                    return
+                if self.state != _PLAYING:
+                    return self._then if self.reason == _BY_TIMEOUT else _THEN_GO_ON
                 elapsed = now - self.begun
                 reason = self._over(elapsed)
         if self._moving:
             share = steps.ease(elapsed + 1, self._ramp, self._easing)
-            self._app.bubbles.advance(share)
-            self._moving = share < _WHOLE or self.state == PAUSED
+            self._bubbles.advance(share)
+            self._moving = share < _ONE or self.state == _PAUSED
+        return _THEN_GO_ON
 
-    def _open(self):
+    def _open(self) -> None:
         """Begin with the first step."""
-        app = self._app
-        if app.faults & VENTING:
+        if self._faults.board & _VENTING_FAULTS:
             self.cancel()
             return
-        app.self_test.skip()
-        self.state = PLAYING
-        self.reason = UNENDED
+        self._self_test.skip()
+        self.state = _PLAYING
+        self.reason = _UNENDED
         self.unsettled = 0
         self.timeouts = 0
         self.begun = self.start
@@ -213,49 +198,59 @@ class Player:
         self._settle = 0
         self._depth = 0
         self.sequence.next = 0
-        self._next(UNENDED)
-        app.safety.handle(state.SHOW)
+        self._next(_UNENDED)
+        self._safety.handle(_EVENT_SHOW)
 
-    def _over(self, elapsed):
+    def _over(self, elapsed: int) -> int:
         """Why the step is over after so many ticks of it, UNENDED where it is not."""
         if not self._settle:
-            return BY_TIME if elapsed >= self._length else UNENDED
+            return _BY_TIME if elapsed >= self._length else _UNENDED
         if elapsed < self._ramp:
-            return UNENDED
-        self.unsettled = self._app.bubbles.unsettled(self._tolerance)
+            return _UNENDED
+        self.unsettled = self._bubbles.unsettled(self._tolerance)
         if not self.unsettled:
-            return BY_SETTLING
-        return BY_TIMEOUT if elapsed >= self._length else UNENDED
+            return _BY_SETTLING
+        return _BY_TIMEOUT if elapsed >= self._length else _UNENDED
 
-    def _next(self, reason):
+    def _next(self, reason: int) -> None:
         """Begin the step that follows one that ended for `reason`, or end the sequence."""
-        tick = self._app.ticks
+        tick = self._clock.ticks
         if not self._settle:
             tick = self.begun + self._length
-        elif reason == BY_TIMEOUT:
+        elif reason == _BY_TIMEOUT:
             self.timeouts += 1
-            if self._then != steps.GO_ON:
-                self._end_by_timeout(tick)
+            if self._then != _THEN_GO_ON:
+                self._end(_BY_TIMEOUT, tick)
                 return
+        ended = self._find_step()
+        if ended:
+            self._end(ended, tick)
+            return
+        sequence = self.sequence
+        self.record = sequence.next
+        sequence.next = self.record + 1
+        self.begun = tick
+        self._keep_event(_STEP_BEGUN, reason, tick)
+        self._begin(sequence.block(self.record), sequence.offset(self.record))
+
+    def _find_step(self) -> int:
+        """Go through repeats and their ends up to the next step; UNENDED, or why there is none."""
         sequence = self.sequence
         while True:
             record = sequence.next
             if sequence.total and record == sequence.total:
-                self._end(COMPLETE, tick)
-                return
+                return _COMPLETE
             if record == sequence.received:
-                self._end(UNDERRUN, tick)
-                return
-            place = record % sequence.capacity
-            memory = sequence.memory[place // sequence.piece]
-            at = place % sequence.piece * sequence.words
-            kind = _word(memory, at) & 3
-            if kind == steps.STEP:
-                break
-            if kind == steps.REPEAT:
+                return _UNDERRUN
+            block = sequence.block(record)
+            at = sequence.offset(record)
+            kind = word(block, at) & 3
+            if kind == _STEP:
+                return _UNENDED
+            if kind == _REPEAT:
                 sequence.next = record + 1
                 self._back[self._depth] = record + 1
-                self._left[self._depth] = _word(memory, at + 1) - 1
+                self._left[self._depth] = word(block, at + 1) - 1
                 self._depth += 1
             else:
                 left = self._left[self._depth - 1]
@@ -266,22 +261,17 @@ class Player:
                 else:
                     self._depth -= 1
                     sequence.next = record + 1
-        sequence.next = record + 1
-        self.record = record
-        self.begun = tick
-        self._tell(STEP_BEGUN, reason, self.begun)
-        self._begin(memory, at)
 
-    def _begin(self, memory, at):
-        """Begin the step whose record stands at `memory[at:]`."""
-        flags = _word(memory, at)
+    def _begin(self, block: bytearray, at: int) -> None:
+        """Begin the step whose record stands at `block[at:]`."""
+        flags = word(block, at)
         tick_us = self._tick_us
-        ramp_us = _word(memory, at + 1) * 1000
-        span_us = ramp_us + _word(memory, at + 2) * 1000
+        ramp_us = word(block, at + 1) * 1000
+        span_us = ramp_us + word(block, at + 2) * 1000
         self._easing = flags >> 2 & 3
         self._settle = flags >> 4 & 1
         self._then = flags >> 5 & 3
-        self._tolerance = _word(memory, at + 3)
+        self._tolerance = word(block, at + 3)
         self._ramp = ramp_us // tick_us or 1
         if self._settle:
             self._length = (span_us + tick_us - 1) // tick_us
@@ -292,67 +282,40 @@ class Player:
             self._carry_us = span_us % tick_us
         self.unsettled = 0
         self._moving = True
-        self._app.bubbles.begin_step(memory, at + steps.HEAD, self._app.mode != ACTIVE)
+        self._bubbles.begin_step(block, at + _HEAD, self._safety.mode != _ACTIVE)
 
-    def _end_by_timeout(self, tick):
-        app = self._app
-        self._end(BY_TIMEOUT, tick)
-        if self._then == steps.VENT:
-            app.vent()
-        elif self._then == steps.STOP:
-            app.stop()
-
-    def _end(self, reason, tick):
+    def _end(self, reason: int, tick: int) -> None:
         self.running = False
-        self.state = ENDED
+        self.state = _ENDED
         self.reason = reason
         self._moving = False
-        self._tell(SEQUENCE_ENDED, reason, tick)
+        self._keep_event(_SEQUENCE_ENDED, reason, tick)
 
-    def cancel(self):
-        """Something else decides from now on where the bubbles go."""
-        if self.running:
-            self._end(CANCELLED, self._app.ticks)
+    # What is to be sent to the host.
 
-    def pause(self):
-        """Let time and setpoints stand still."""
-        if self.state == PLAYING:
-            self._elapsed = self._app.ticks - self.begun
-            self.state = PAUSED
-            self._tell(SEQUENCE_PAUSED, UNENDED, self._app.ticks)
+    def _keep_event(self, event: int, reason: int, tick: int) -> None:
+        if self.events_waiting == _EVENTS:  # the oldest is lost, and its number with it
+            self.drop_event()
+        events = self._events
+        at = (self._oldest + self.events_waiting) % _EVENTS * _EVENT_FIELDS
+        events[at + _EVENT_TICKS] = tick
+        events[at + _EVENT_SEQUENCE] = self.id
+        events[at + _EVENT_EVENT] = event
+        events[at + _EVENT_REASON] = reason
+        events[at + _EVENT_RECORD] = self.record
+        events[at + _EVENT_UNSETTLED] = self.unsettled
+        self.events_waiting += 1
 
-    def resume(self):
-        """Let time go on from where it stood still."""
-        if self.state == PAUSED:
-            self.begun = self._app.ticks - self._elapsed
-            self.state = PLAYING
-            self._tell(SEQUENCE_RESUMED, UNENDED, self._app.ticks)
+    def read_event(self, values: "array[int]") -> None:
+        """Put the oldest event in `values`, as the fields of SEQUENCE_EVENT."""
+        events = self._events
+        at = self._oldest * _EVENT_FIELDS
+        for field in range(_EVENT_FIELDS):
+            values[field] = events[at + field]
+        values[_EVENT_FREE] = self.sequence.free
 
-    # What the host is to be told.
-
-    def _tell(self, event, reason, tick):
-        news = self._news
-        if self.waiting_news == _NEWS:  # the oldest is lost, and its number with it
-            self.forget_news()
-        at = (self._oldest + self.waiting_news) % _NEWS * _FIELDS
-        news[at] = tick
-        news[at + 1] = self.id
-        news[at + 2] = event
-        news[at + 3] = reason
-        news[at + 4] = self.record
-        news[at + 5] = self.unsettled
-        self.waiting_news += 1
-
-    def read_news(self, values):
-        """The oldest event, as the fields of SEQUENCE_EVENT."""
-        news = self._news
-        at = self._oldest * _FIELDS
-        for field in range(_FIELDS):
-            values[field] = news[at + field]
-        values[_FIELDS] = self.sequence.free
-
-    def forget_news(self):
-        """The oldest event has been told, or is lost."""
-        self._oldest = (self._oldest + 1) % _NEWS
-        self.waiting_news -= 1
-        self.number = self.number + 1 & 0xFFFF
+    def drop_event(self) -> None:
+        """The oldest event has been sent, or is lost."""
+        self._oldest = (self._oldest + 1) % _EVENTS
+        self.events_waiting -= 1
+        self.event_number = self.event_number + 1 & 0xFFFF

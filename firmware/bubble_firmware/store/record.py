@@ -1,45 +1,55 @@
-"""What the store keeps of an app, as bytes: tables, settings and figures, each a section of its own.
+"""What the store keeps, as bytes: tables, settings and trim, each a section of its own.
 
 A section is u8 id, u8 zero, u16 length, content; all numbers are little-endian. Contents only ever grow at their ends, and
 sections are only ever added: what an older record lacks is the default, what this firmware does not know makes the
 record one of a newer schema.
 
     TABLES    per bubble u8 knots; then all bubbles' knots as u16 µm, u16 Pa
-    SETTINGS  i32 each, in the order of `app.settings.values`
-    FIGURES   per bubble u16 each, in the order of `figures`
+    SETTINGS  i32 each, in the order of the schema
+    TRIM      per bubble u16 each, in the order of `trim`
 """
 
 from array import array
 
-from bubble_firmware.control import trim
+from bubble_firmware.control import trim as trims
 from bubble_firmware.control.table import KNOT_BYTES, KNOTS_MAX
 from bubble_protocol.buffers import copy, get16, get32, put16, put32
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from bubble_firmware.control.bubbles import Bubbles
+    from bubble_firmware.control.table import Tables
+    from bubble_firmware.control.trim import Trim
+    from bubble_firmware.store.settings import Settings
 
 SCHEMA = 1
 
-_TABLES = 1
-_SETTINGS = 2
-_TRIM = 3
-_SECTION = 4  # bytes of its head
+_TABLES = const(1)
+_SETTINGS = const(2)
+_TRIM = const(3)
+_SECTION = const(4)  # bytes of its head
 _BUBBLE_KNOTS = KNOTS_MAX * KNOT_BYTES
 
 
 class Content:
-    """The sections of `app`: `write` makes them, `take` takes them up, all or none, `use_defaults` does without."""
+    """The sections of what is in use: `write` makes them, `take` takes them up, all or none, `use_defaults` does without."""
 
-    def __init__(self, app):
-        self._app = app
-        n = app.board.BUBBLES
-        # Not every firmware has settings; those it was made with are the defaults.
-        self._settings = app.settings.values if hasattr(app, "settings") else array("i")
-        self._default_settings = array("i", self._settings)
-        self._figures = array("i", bytearray(4 * trim.COUNT * n))
-        self._found = array("i", bytearray(8 * len(self._settings)))
-        self.size_max = 3 * _SECTION + n + n * _BUBBLE_KNOTS + 4 * len(self._settings) + 2 * trim.COUNT * n
+    def __init__(self, board: "ModuleType", tables: "Tables", bubbles: "Bubbles", trim: "Trim", settings: "Settings"):
+        n = board.BUBBLES
+        self.tables = tables
+        self._board = board
+        self._bubbles = bubbles
+        self._trim = trim
+        self._settings = settings
+        self._trims = array("i", bytearray(4 * trims.COUNT * n))
+        self._found = array("i", bytearray(8 * settings.count))
+        self.size_max = 3 * _SECTION + n + n * _BUBBLE_KNOTS + 4 * settings.count + 2 * trims.COUNT * n
 
-    def write(self, data, at):
+    def write(self, data: bytearray, at: int) -> int:
         """Write all sections to `data[at:]`; returns the index after them."""
-        tables = self._app.tables
+        tables = self.tables
         start = at
         at += _SECTION
         for bubble in range(tables.bubbles):
@@ -47,66 +57,65 @@ class Content:
             at += 1
         for bubble in range(tables.bubbles):
             size = tables.sizes[bubble] * KNOT_BYTES
-            copy(tables.knots, bubble * _BUBBLE_KNOTS, data, at, size)
+            first = bubble * _BUBBLE_KNOTS
+            copy(tables.knots, first, first + size, data, at)
             at += size
-        start = at = _head(data, start, at, _TABLES)
+        start = at = _put_head(data, start, at, _TABLES)
         at += _SECTION
-        for value in self._settings:
+        for value in self._settings.values:
             put32(data, at, value)
             at += 4
-        start = at = _head(data, start, at, _SETTINGS)
+        start = at = _put_head(data, start, at, _SETTINGS)
         at += _SECTION
-        self._app.figures.read(self._figures)
-        for value in self._figures:
+        self._trim.read(self._trims)
+        for value in self._trims:
             put16(data, at, value)
             at += 2
-        return _head(data, start, at, _TRIM)
+        return _put_head(data, start, at, _TRIM)
 
-    def take(self, data, at, end):
+    def take(self, data: bytearray, at: int, end: int) -> bool:
         """Take up the sections in `data[at:end]`, defaults for what they lack; whether the board allows them."""
-        tables = self._app.tables
+        tables = self.tables
         tables.use_nominal()
-        self._settings[:] = self._default_settings
+        self._settings.use_defaults()
         for bubble in range(tables.bubbles):
-            for number in range(trim.COUNT):
-                self._figures[bubble * trim.COUNT + number] = self._app.figures.nominal[number]
-        fits = True
-        while fits and at < end:
+            for number in range(trims.COUNT):
+                self._trims[bubble * trims.COUNT + number] = self._trim.nominal[number]
+        valid = True
+        while valid and at < end:
             section = data[at]
             size = get16(data, at + 2)
             at += _SECTION
-            fits = at + size <= end and self._take_section(section, data, at, size)
+            valid = at + size <= end and self._take_section(section, data, at, size)
             at += size
-        if fits:
-            self._app.figures.use(self._figures)
+        if valid:
+            self._trim.use(self._trims)
             tables.swap()
-            self._app.bubbles.use_tables()
-            self._app.use_settings()
+            self._bubbles.use_tables()
         else:
             self.use_defaults()
-        return fits
+        return valid
 
-    def use_defaults(self):
+    def use_defaults(self) -> None:
         """Take up what the firmware was made with."""
-        self._settings[:] = self._default_settings
-        self._app.figures.use_nominal()
-        self._app.tables.use_nominal()
-        self._app.bubbles.use_tables()
-        self._app.use_settings()
+        self._settings.use_defaults()
+        self._trim.use_nominal()
+        self.tables.use_nominal()
+        self._bubbles.use_tables()
 
-    def _take_section(self, section, data, at, size):
+    def _take_section(self, section: int, data: bytearray, at: int, size: int) -> bool:
         """Take one section, as far as this firmware knows it; whether the board allows it."""
         if section == _TABLES:
             return self._take_tables(data, at, at + size)
         if section == _SETTINGS:
             return self._take_settings(data, at, size)
         if section == _TRIM:
-            return self._take_figures(data, at, size)
+            return self._take_trim(data, at, size)
         return True
 
-    def _take_tables(self, data, at, end):
-        tables = self._app.tables
-        board = self._app.board
+    def _take_tables(self, data: bytearray, at: int, end: int) -> bool:
+        tables = self.tables
+        board = self._board
         sizes = at
         at += tables.bubbles
         for bubble in range(tables.bubbles):
@@ -119,29 +128,29 @@ class Content:
                 at += KNOT_BYTES
         return tables.first_flaw(board.HEIGHT_MAX_UM, board.PRESSURE_MAX_PA) < 0
 
-    def _take_settings(self, data, at, size):
-        count = min(size // 4, len(self._settings))
+    def _take_settings(self, data: bytearray, at: int, size: int) -> bool:
+        settings = self._settings
+        count = min(size // 4, settings.count)
         for index in range(count):
             self._found[2 * index] = index
             self._found[2 * index + 1] = get32(data, at + 4 * index)
         if not count:
             return True
-        settings = self._app.settings
-        if settings.flaw(self._found, 0, count) >= 0:
+        if settings.first_invalid(self._found, 0, count) >= 0:
             return False
         settings.use()
         return True
 
-    def _take_figures(self, data, at, size):
-        n = self._app.board.BUBBLES
+    def _take_trim(self, data: bytearray, at: int, size: int) -> bool:
+        n = self._board.BUBBLES
         stride = size // (2 * n)  # words of one bubble in the record
         for bubble in range(n):
-            for number in range(min(stride, trim.COUNT)):
-                self._figures[bubble * trim.COUNT + number] = get16(data, at + 2 * (bubble * stride + number))
-        return self._app.figures.first_flaw(self._figures) < 0
+            for number in range(min(stride, trims.COUNT)):
+                self._trims[bubble * trims.COUNT + number] = get16(data, at + 2 * (bubble * stride + number))
+        return self._trim.first_invalid(self._trims) < 0
 
 
-def _head(data, start, end, section):
+def _put_head(data: bytearray, start: int, end: int, section: int) -> int:
     """Write a section's head, once its end is known; returns the end."""
     data[start] = section
     data[start + 1] = 0

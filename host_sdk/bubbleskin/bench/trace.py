@@ -48,7 +48,7 @@ def record(name: str, phases: Sequence[tuple[str, float, float, float]], seed: i
         for tick in range(round(seconds / board.tick_s)):
             if every and tick % round(every / board.tick_s) == 0:
                 heights = rng.integers(5500, 12500, board.data.BUBBLES).tolist()
-                firmware.app.show(array("i", heights), 0, round(1000 * ramp))
+                firmware.app.commands.show(array("i", heights), 0, round(1000 * ramp))
                 asked = [(heights, max(1, round(ramp / board.tick_s)))]
             firmware.app.deadman.host_activity()  # no host speaks here: without it, what moves is held after a while
             board.tick()

@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from bubbleskin import boards
@@ -13,6 +12,7 @@ from bubbleskin.flash import mpy, slots, uf2
 from bubbleskin.flash.drive import Progress, check_drive, copy_image
 from bubbleskin.flash.history import History, UnderWay
 from bubbleskin.flash.machine import Connection, Machine
+from bubbleskin.flash.order import Order, Outcome
 from bubbleskin.flash.prompt import Prompt
 from bubbleskin.link.link import run_sync
 from bubbleskin.skin import Skin
@@ -24,28 +24,6 @@ _BACK_S = 30.0  # until new firmware answers
 _STEP_S = 0.25
 
 BOOTSEL = "unplug the wristband, hold BOOTSEL while you plug it in, then run `bubbleskin flash` again"
-
-
-@dataclass(frozen=True)
-class Order:
-    """What is asked for; None and False leave it to what is found."""
-
-    board: str | None = None
-    device: str | None = None
-    drive: Path | None = None
-    uf2: Path | None = None
-    mpy: bool = False
-    previous: bool = False
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What has been done: `how` is "uf2" or "mpy", `info` the new firmware's answer to HELLO."""
-
-    how: str
-    info: Info
-    old: str | None
-    """The version that was there before, where it said one."""
 
 
 def flash(

@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from bubble_firmware.app import App
+from bubble_firmware.hal.base import Hal
 from bubbleskin.sim.flash import NorFlash
 
 
@@ -41,18 +42,13 @@ class Firmware(ABC):
         """End it."""
 
 
-class InProcessFirmware(Firmware):
-    """The firmware in this very interpreter. It is also the `hands` of the firmware's `App`."""
-
-    late_ticks = 0
-    alarms = 0
-    boot_faults = 0
-    self_test = False
+class InProcessFirmware(Firmware, Hal):
+    """The firmware in this very interpreter. It is also the hardware under it."""
 
     def __init__(self, board: ModuleType, boot_id: int, flash: NorFlash | None = None):
+        super().__init__(board)
         self.boot_id = boot_id
         self.flash = flash or NorFlash()
-        self._board = board
         self._restarting = False
         self._counts = array("H", bytes(2 * (board.BUBBLES + 1)))
         self._pulses = array("H", bytes(4 * board.BUBBLES))
@@ -79,7 +75,7 @@ class InProcessFirmware(Firmware):
         """See `Firmware`."""
         self._restarting = False
         self.boot_id += 1
-        self.app = App(self._board, self)
+        self.app = App(self.board, self)
 
     def listen(self, link: bytes, phase_us: int) -> Outputs:
         """See `Firmware`."""
@@ -92,17 +88,17 @@ class InProcessFirmware(Firmware):
     def close(self) -> None:
         """Nothing to end."""
 
-    # The hands.
+    # The hardware.
 
-    def sense(self, counts: array) -> None:
+    def read_sensors(self, counts: array) -> None:
         """Fill in the counts of this tick."""
         counts[:] = self._counts
 
-    def act(self, pulses: array, pump: int, dump: bool) -> None:
+    def write_outputs(self, pulses: array, pump: int, dump: int) -> None:
         """Set the outputs of the next period."""
-        self._pulses, self._pump, self._dump = pulses[:], pump, dump
+        self._pulses, self._pump, self._dump = pulses[:], pump, bool(dump)
 
-    def vent(self) -> None:
+    def safe_outputs(self) -> None:
         """Fill closed, vent open, pump off."""
         self._pulses = array("H", [0, self._tick_us] * (len(self._pulses) // 2))
         self._pump, self._dump = 0, False
@@ -116,18 +112,6 @@ class InProcessFirmware(Firmware):
         """Queue a frame; there is always room."""
         self._out += frame[:length]
         return True
-
-    def alive(self, mode: int, faults: int) -> None:
-        """There is no watchdog."""
-
-    def clear(self) -> None:
-        """Nothing here fails by itself."""
-
-    def slack(self) -> None:
-        """Time stands still within a tick."""
-
-    def tidy(self) -> None:
-        """The interpreter collects by itself."""
 
     def restart(self, into: int) -> None:
         """Start again after this tick; there is no other boot loader or prompt."""

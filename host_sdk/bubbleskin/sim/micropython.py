@@ -19,12 +19,13 @@ from bubbleskin.toolchain.interpreter import find_micropython
 
 HEAP = "448k"
 """What the firmware needs here: 116 kB of data (19 bubbles), as on the Pico, which has 237 kB for them. In this heap
-are also the firmware's code, 139 kB, and 17 kB that stand for flash; and compiling the code takes room and leaves holes."""
+are also the firmware's code, 137 kB, and 17 kB that stand for flash; and compiling the code takes room and leaves holes."""
 
 _PATIENCE = 10.0  # wall seconds for one tick, which takes well under a millisecond
 
 _PROGRAM = """
-import sys
+import gc, sys
+gc.threshold(16384)  # bytes: what compiling leaves behind goes at once, or the code lies all over the heap
 sys.path[:] = {path!r}
 from bubble_firmware.main import lockstep
 {import_board}

@@ -6,6 +6,8 @@ BOARD_FAULT, OVERTAKEN = 9, 10
 NO_SETTING = 12
 NOT_VENTED, STORE_FOREIGN, STORE_FAILED = 15, 16, 17
 WRONG_BOARD, BAD_STEP, BAD_LOOP, OUT_OF_ORDER, NO_ROOM, NOT_READY, TOO_LATE = range(18, 25)
+NO_ELEMENT = 255  # in place of a repetition's number: it is about none
+
 ERRORS = (
     (UNKNOWN_MESSAGE, "unknown_message", "no message has this id"),
     (WRONG_LENGTH, "wrong_length", "the payload is too short or too long: asked bytes, low to high allowed"),
