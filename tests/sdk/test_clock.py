@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bubbleskin.bench.clock import LAWS, _uniform, history
+from bubbleskin.bench.clock import LAWS, history, uniform
 from bubbleskin.errors import LinkError
 from bubbleskin.link.clock import DRIFT, WANDER, Clock
 
@@ -32,7 +32,7 @@ class Host:
 def test_the_error_is_below_a_millisecond_and_within_what_is_stated(law, reads_every):
     asked = np.array(history(law, 1000, reads_every=reads_every))
     assert (asked[:, 1] <= asked[:, 2]).all()
-    if law is not _uniform or not reads_every:  # 20 ms each way and 5 more of waiting for the tick: 1.2 ms, said so
+    if law is not uniform or not reads_every:  # 20 ms each way and 5 more of waiting for the tick: 1.2 ms, said so
         assert np.quantile(asked[asked[:, 0] == 30, 1], 0.99) < 1e-3
 
 

@@ -25,7 +25,8 @@ Law = Callable[[np.random.Generator, int], tuple[NDArray[np.float64], NDArray[np
 """Delays out and back of so many pings, s, (n,) each."""
 
 
-def _uniform(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def uniform(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Waits up to 20 ms each way, evenly spread."""
     return rng.uniform(0, 20e-3, n), rng.uniform(0, 20e-3, n)
 
 
@@ -51,7 +52,7 @@ def _stalls(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float64], NDAr
 
 
 LAWS: dict[str, Law] = {
-    "uniform, 0-20 ms each way": _uniform,
+    "uniform, 0-20 ms each way": uniform,
     "exponential, mean 5 ms each way": _exponential,
     "USB: polled, at times 20 ms late on the way back": _usb,
     "0-20 ms on the way back only": _one_way,
