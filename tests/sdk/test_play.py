@@ -169,7 +169,7 @@ def test_a_fault_of_the_board_is_named(tapped):
     skin, _ = tapped()
 
     def press(playing):
-        skin.simulated.firmware.alarms = faults.ESTOP
+        skin.simulated.firmware.active_faults = faults.ESTOP
 
     with pytest.raises(bs.DeviceFault, match=r"ended in step 0 \(up\): faults of the board: emergency_stop"):
         skin.play(TWO, progress=press)
