@@ -210,7 +210,7 @@ def test_nothing_overflows_32_bits(rig7, seed):
         tables.swap()
         rig7.app.bubbles.use_tables()
         for _ in range(4):
-            rig7.app.show(
+            rig7.app.commands.show(
                 array("i", [chance.choice([0, 14000, chance.randrange(14001)]) for _ in range(7)]),
                 0,
                 chance.choice([0, 60000]),

@@ -3,24 +3,59 @@
 A field is (name, kind, unit, low, high, meaning). Limits of None: every value of the kind is allowed. A
 message has fixed fields and may end in a group of fields repeated to the end of the payload. Replies have
 the request's id plus REPLY. All numbers are little-endian. Fields are only ever appended.
+
+Ids and kinds are `const`, so that on a device all of this stays in flash: a tuple of constants costs no memory.
 """
 
+from bubble_protocol.mpy_compat import const
+
 # Kinds: the low bits are the size in bytes, the top bit says signed. TEXT is 16 bytes of ASCII, zero padded.
-U8, U16, U32, I16, I32 = 0x01, 0x02, 0x04, 0x82, 0x84
-TEXT = 0x10
+U8 = const(0x01)
+U16 = const(0x02)
+U32 = const(0x04)
+I16 = const(0x82)
+I32 = const(0x84)
+TEXT = const(0x10)
 KIND_NAMES = {U8: "u8", U16: "u16", U32: "u32", I16: "i16", I32: "i32", TEXT: "text16"}
 
-REPLY = 0x80
+REPLY = const(0x80)
 
-HELLO, PING, INFO, SHOW, STATE, SUBSCRIBE, TELEMETRY = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
-TABLE_WRITE, TABLE_COMMIT, TABLE_READ, STOP, VENT, CLEAR = 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D
-TICKS, RESTART, LAYOUT = 0x0E, 0x0F, 0x10
-STORE_SAVE, STORE_INFO, STORE_RESET, TRIM_WRITE, TRIM_READ = 0x16, 0x17, 0x18, 0x19, 0x1A
-SEQUENCE_BEGIN, SEQUENCE_WRITE, SEQUENCE_ARM, SEQUENCE_START = 0x20, 0x21, 0x22, 0x23
-SEQUENCE_CONTROL, SEQUENCE_STATE, SEQUENCE_EVENT = 0x24, 0x25, 0x26
-SUBSCRIBE_FIELDS, TELEMETRY_FIELDS = 0x1B, 0x1C
-FAULTS_READ, FAULTS_ACK, SETTING_READ, SETTING_WRITE = 0x12, 0x13, 0x14, 0x15
-ERROR = 0x7F
+HELLO = const(0x01)
+PING = const(0x02)
+INFO = const(0x03)
+SHOW = const(0x04)
+STATE = const(0x05)
+SUBSCRIBE = const(0x06)
+TELEMETRY = const(0x07)
+TABLE_WRITE = const(0x08)
+TABLE_COMMIT = const(0x09)
+TABLE_READ = const(0x0A)
+STOP = const(0x0B)
+VENT = const(0x0C)
+CLEAR = const(0x0D)
+TICKS = const(0x0E)
+RESTART = const(0x0F)
+LAYOUT = const(0x10)
+STORE_SAVE = const(0x16)
+STORE_INFO = const(0x17)
+STORE_RESET = const(0x18)
+TRIM_WRITE = const(0x19)
+TRIM_READ = const(0x1A)
+SEQUENCE_BEGIN = const(0x20)
+SEQUENCE_WRITE = const(0x21)
+SEQUENCE_ARM = const(0x22)
+SEQUENCE_START = const(0x23)
+SEQUENCE_CONTROL = const(0x24)
+SEQUENCE_STATE = const(0x25)
+SEQUENCE_EVENT = const(0x26)
+SUBSCRIBE_FIELDS = const(0x1B)
+TELEMETRY_FIELDS = const(0x1C)
+FAULTS_READ = const(0x12)
+FAULTS_ACK = const(0x13)
+SETTING_READ = const(0x14)
+SETTING_WRITE = const(0x15)
+ERROR = const(0x7F)
+
 
 _TICKS = ("ticks", U32, "ticks", None, None, "device time: ticks since boot")
 _BUBBLES = (
