@@ -1,13 +1,17 @@
+# mypy: disable-error-code="attr-defined"
 """Where the firmware starts: choose the board, then tick."""
 
 import gc
 
 from bubble_firmware import boards
-from bubble_firmware.app import App, run
+
+_SPARE = 2048  # bytes
+_COLLECT = 16384  # bytes between two collections while there are imports
 
 
 def lockstep(name, boot_id):
     """Run the firmware of board `name` against a plant at the other end of stdin and stdout."""
+    from bubble_firmware.app import App, run
     from bubble_firmware.boards.lockstep import Hands
 
     board = boards.load(name)
@@ -19,8 +23,17 @@ def lockstep(name, boot_id):
 
 def pico(name):
     """Run the firmware of board `name` on the Raspberry Pi Pico that this is."""
+    # A function of many locals has its frame on the heap while it runs. The search for room begins at the heap's start:
+    # in a heap that is full it takes every tick the better part of a millisecond. So we keep room free there.
+    spare = bytearray(_SPARE)
+    gc.threshold(_COLLECT)  # or what imports leave behind lies scattered over all of the heap, and no large piece is left
+    board = boards.load(name)
     from bubble_firmware.boards.pico import Hands
 
-    board = boards.load(name)
     hands = Hands(board)  # first of all: it makes the outputs safe
-    run(App(board, hands))
+    from bubble_firmware.app import App, run
+
+    gc.threshold(-1)  # no tick collects
+    app = App(board, hands)
+    del spare
+    run(app)

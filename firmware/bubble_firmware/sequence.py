@@ -5,6 +5,7 @@ Times in records are ms; the player counts whole ticks and carries what is left 
 step begins in the tick of its schedule, however many came before it. Memory is made once; playing allocates nothing.
 """
 
+import gc
 from array import array
 
 from bubble_firmware import safety
@@ -37,6 +38,7 @@ _NEWS = const(8)  # events that may wait for room on the link
 _FIELDS = const(6)  # of an event: ticks, sequence, event, reason, record, unsettled
 _WHOLE = const(32768)
 _PIECE = const(4096)  # bytes
+_LEFT = const(6)  # pieces of the heap that are not ours: what is made after us takes 11 kB
 
 
 @micropython.viper
@@ -61,9 +63,17 @@ class Sequence:
         # In pieces, because a heap that compiles its own code has no large ones left; no arrays, for each would be
         # made from a second one.
         self.piece = _PIECE // (2 * self.words)  # records in each
-        self.memory = []
-        for _ in range(board.SEQUENCE_BYTES // _PIECE):
-            self.memory.append(bytearray(2 * self.piece * self.words))
+        self.memory: "list[bytearray]" = []
+        gc.collect()
+        left = [bytearray(_PIECE) for _ in range(_LEFT)]
+        try:
+            for _ in range(board.SEQUENCE_BYTES // _PIECE):
+                self.memory.append(bytearray(2 * self.piece * self.words))
+        except MemoryError:  # a stock MicroPython has our code on its heap, too
+            if not self.memory:
+                raise
+        del left
+        gc.collect()
         self.capacity = len(self.memory) * self.piece
         self.check = array("i", bytearray(4 * steps.CHECK))
         self.check[steps.BUBBLES] = board.BUBBLES

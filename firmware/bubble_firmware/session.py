@@ -11,7 +11,7 @@ from bubble_firmware.care import Care
 from bubble_firmware.requests import NO_ELEMENT, Requests
 from bubble_firmware.telemetry import Telemetry
 from bubble_protocol import codec, framing, messages
-from bubble_protocol.crc import crc32_into, crc32_word
+from bubble_protocol.crc import crc32_into, crc32_on
 from bubble_protocol.portable import const, heap_free
 from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
 
@@ -43,8 +43,10 @@ class Session(Requests):
         self.heard = 0  # frames of the open session since boot, modulo 65536: the host is alive
         self.capabilities = messages.DELIVERY | messages.SAFETY | messages.CAN_CHOOSE_TELEMETRY
         self._heap_free = heap_free()
-        schema = codec.schema_bytes()
-        self._schema_crc = crc32_word(schema, 0, len(schema))
+        crc = array("i", (0,))
+        for line in codec.schema_lines():
+            crc32_on(line, 0, len(line), crc)
+        self._schema_crc = crc[0]
         self._name = (app.board.NAME.encode() + bytes(16))[:16]  # bytes: a letter of a string can be an allocation
         boot_id = app.hands.boot_id & 0xFFFFFFFF
         self._boot_id = boot_id - (boot_id >> 31 << 32)  # the same 32 bits as a signed word

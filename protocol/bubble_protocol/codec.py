@@ -82,15 +82,18 @@ def _expand(fields):
 
 def _limits(fields, which, none):
     """One limit per value, `none` where every value is allowed."""
-    limits = array("i")
+    limits = []
     for field in fields:
         for _ in range(16 if field[1] == TEXT else 1):
             limits.append(none if field[which] is None else field[which])
-    return limits
+    return array("i", limits)  # of its very size: one that has grown keeps room for more
 
 
 class Message:
     """How one message is packed: made once from the schema, allocates nothing when used."""
+
+    # As of a message without limits, which most are: where the code is on the heap, there is no room for what says nothing.
+    _lows = _highs = None
 
     def __init__(self, message_id, name, fixed, repeated, meaning):
         self.id = message_id
@@ -102,8 +105,11 @@ class Message:
         self._repeated_kinds = _expand(repeated)
         self.fixed_values = len(self._fixed_kinds)
         self.stride_values = len(self._repeated_kinds)
-        self._lows = _limits(fixed + repeated, 3, -0x80000000)
-        self._highs = _limits(fixed + repeated, 4, 0x7FFFFFFF)
+        for field in fixed + repeated:
+            if field[3] is not None or field[4] is not None:
+                self._lows = _limits(fixed + repeated, 3, -0x80000000)
+                self._highs = _limits(fixed + repeated, 4, 0x7FFFFFFF)
+                break
         self.fixed_size = sum(kind & 15 for kind in self._fixed_kinds)
         self.stride = sum(kind & 15 for kind in self._repeated_kinds)
         self.least = FIRST_SIZES.get(message_id, self.fixed_size)
@@ -145,6 +151,8 @@ class Message:
 
     def outside(self, values, count):
         """The index of the first of `values` that is outside the schema's limits, -1 where all are within."""
+        if self._lows is None:
+            return -1
         end = self.fixed_values + count * self.stride_values
         return _outside(values, self._lows, self._highs, self.fixed_values, self.stride_values, end)
 
@@ -153,11 +161,16 @@ BY_ID = {data[0]: Message(*data) for data in MESSAGES}
 BY_NAME = {message.name: message for message in BY_ID.values()}
 
 
-def schema_bytes():
-    """What the schema's CRC is taken of: everything that decides the bytes on the wire, in canonical form."""
-    parts = []
+def schema_lines():
+    """`schema_bytes`, message by message: a small heap has no room for all of it at once."""
+    first = True
     for message_id, name, fixed, repeated, _ in MESSAGES:
         fields = ",".join("%s:%d" % (field[0], field[1]) for field in fixed)
         group = ",".join("%s:%d" % (field[0], field[1]) for field in repeated)
-        parts.append("%d %s(%s)[%s]" % (message_id, name, fields, group))
-    return "\n".join(parts).encode()
+        yield ("%s%d %s(%s)[%s]" % ("" if first else "\n", message_id, name, fields, group)).encode()
+        first = False
+
+
+def schema_bytes():
+    """What the schema's CRC is taken of: everything that decides the bytes on the wire, in canonical form."""
+    return b"".join(schema_lines())

