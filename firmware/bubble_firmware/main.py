@@ -26,9 +26,8 @@ def pico(name):
     # A function of many locals has its frame on the heap while it runs. The search for room begins at the heap's start:
     # in a heap that is full it takes every tick the better part of a millisecond. So we keep room free there.
     spare = bytearray(_SPARE)
-    gc.threshold(
-        _COLLECT
-    )  # or what imports leave behind lies scattered over all of the heap, and no large piece is left
+    # And what imports leave behind must not lie scattered over all of the heap, or no large piece is left.
+    gc.threshold(_COLLECT)
     board = boards.load(name)
     from bubble_firmware.boards.pico import Hands
 
