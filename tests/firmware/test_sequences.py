@@ -510,3 +510,30 @@ def test_events_that_find_no_room_are_missed_by_their_number(seven):
 def test_the_schemas_names_are_the_steps_own():
     assert codec.BY_NAME["SEQUENCE_WRITE"].fixed_size == 4
     assert (steps.HEAD, steps.LEAVE) == (4, 0xFFFF)
+
+
+def test_where_the_heap_is_small_the_memory_is_what_there_is_room_for(micropython):
+    said = micropython(
+        """
+        import gc
+        room = bytearray(60000)
+        from bubble_firmware import boards
+        from bubble_firmware.sequence import Sequence
+        board = boards.load("wristband7")
+        gc.collect()
+        taken = []
+        try:
+            while True:
+                taken.append(bytearray(1000))
+        except MemoryError:
+            pass
+        del room
+        sequence = Sequence(board)
+        gc.collect()
+        print(sequence.capacity, sequence.piece, len(sequence.memory), gc.mem_free())
+        """
+    )
+    capacity, piece, pieces, free = map(int, said.split())
+    assert 0 < pieces < 12
+    assert capacity == piece * pieces
+    assert free > 20000, "what is made after it has no room"
