@@ -5,7 +5,6 @@ Times in records are ms; the player counts whole ticks and carries what is left 
 step begins in the tick of its schedule, however many came before it. Memory is made once; playing allocates nothing.
 """
 
-import gc
 from array import array
 
 from bubble_firmware import safety
@@ -64,7 +63,6 @@ class Sequence:
         # made from a second one.
         self.piece = _PIECE // (2 * self.words)  # records in each
         self.memory: "list[bytearray]" = []
-        gc.collect()
         left = [bytearray(_PIECE) for _ in range(_LEFT)]
         try:
             for _ in range(board.SEQUENCE_BYTES // _PIECE):
@@ -73,7 +71,6 @@ class Sequence:
             if not self.memory:
                 raise
         del left
-        gc.collect()
         self.capacity = len(self.memory) * self.piece
         self.check = array("i", bytearray(4 * steps.CHECK))
         self.check[steps.BUBBLES] = board.BUBBLES
