@@ -228,7 +228,7 @@ def test_a_request_at_which_the_device_fails_is_refused_once(rig7, monkeypatch):
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(rig7.app, "show", fail)
+    monkeypatch.setattr(rig7.app.commands, "show", fail)
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.FAULTED
     assert rig7.hal.safe
     assert rig7.app.safety.mode == modes.VENTING

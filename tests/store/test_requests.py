@@ -110,7 +110,7 @@ def test_both_slots_bad_is_said():
 def test_refusals_are_sentences():
     flash = NorFlash()
     open_board(flash=flash).save()
-    skin = open_board(name="wristband19", flash=flash)
+    skin = open_board(board="wristband19", flash=flash)
     assert skin.health().store == "foreign"
     with pytest.raises(bs.DeviceRefused, match=r"another board has saved\. Update the firmware, or .* `factory_reset"):
         skin.save()
