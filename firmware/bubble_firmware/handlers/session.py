@@ -1,5 +1,7 @@
 """Requests that open a session and keep it: HELLO, PING, SUBSCRIBE, SUBSCRIBE_FIELDS."""
 
+from array import array
+
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol import codec
 from bubble_protocol.crc import crc32_on
