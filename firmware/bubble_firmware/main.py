@@ -1,16 +1,20 @@
+# mypy: disable-error-code="attr-defined"
 """Where the firmware starts: with a board, a module as `boards.load` gives it."""
 
 import gc
 
-from bubble_firmware.app import App, run
 from bubble_protocol.mpy_compat import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from types import ModuleType
 
+_SPARE = 2048  # bytes
+_COLLECT = 16384  # bytes between two collections while there are imports
+
 
 def lockstep(board: "ModuleType", boot_id: int) -> None:
     """Run the firmware of `board` against a plant at the other end of stdin and stdout."""
+    from bubble_firmware.app import App, run
     from bubble_firmware.hal.lockstep import LockstepHal
 
     hal = LockstepHal(board, boot_id)
@@ -21,7 +25,17 @@ def lockstep(board: "ModuleType", boot_id: int) -> None:
 
 def pico(board: "ModuleType") -> None:
     """Run the firmware of `board` on the Raspberry Pi Pico that this is."""
+    # A function of many locals has its frame on the heap while it runs. The search for room begins at the heap's start:
+    # in a heap that is full it takes every tick the better part of a millisecond. So we keep room free there.
+    spare = bytearray(_SPARE)
+    # And what imports leave behind must not lie scattered over all of the heap, or no large piece is left.
+    gc.threshold(_COLLECT)
     from bubble_firmware.hal.pico import PicoHal
 
     hal = PicoHal(board)  # first of all: it makes the outputs safe
-    run(App(board, hal))
+    from bubble_firmware.app import App, run
+
+    gc.threshold(-1)  # no tick collects
+    app = App(board, hal)
+    del spare
+    run(app)

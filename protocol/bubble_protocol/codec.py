@@ -11,7 +11,7 @@ from bubble_protocol.mpy_compat import TYPE_CHECKING, micropython, ptr8, ptr32
 from bubble_protocol.schema.messages import FIRST_SIZES, MESSAGES, TEXT
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     Field = tuple[str, int, str, int | None, int | None, str]
 
@@ -89,16 +89,20 @@ def _kinds(fields: "Sequence[Field]") -> bytes:
 
 def _limits(fields: "Sequence[Field]", which: int, none: int) -> "array[int]":
     """One limit per value, `none` where every value is allowed."""
-    limits = array("i")
+    limits = []
     for field in fields:
         for _ in range(TEXT_SIZE if field[1] == TEXT else 1):
             limit = field[which]
             limits.append(none if limit is None else limit)
-    return limits
+    return array("i", limits)  # of its very size: one that has grown keeps room for more
 
 
 class Message:
     """How one message is packed: made once from the schema, allocates nothing when used."""
+
+    # As of a message without limits, which most are: where the code is on the heap, there is no room for what says nothing.
+    _lows: "array[int] | None" = None
+    _highs: "array[int] | None" = None
 
     def __init__(
         self, message_id: int, name: str, fixed: "tuple[Field, ...]", repeated: "tuple[Field, ...]", meaning: str
@@ -112,8 +116,11 @@ class Message:
         self._repeated_kinds = _kinds(repeated)
         self.fixed_values = len(self._fixed_kinds)
         self.stride_values = len(self._repeated_kinds)
-        self._lows = _limits(fixed + repeated, 3, -0x80000000)
-        self._highs = _limits(fixed + repeated, 4, 0x7FFFFFFF)
+        for field in fixed + repeated:
+            if field[3] is not None or field[4] is not None:
+                self._lows = _limits(fixed + repeated, 3, -0x80000000)
+                self._highs = _limits(fixed + repeated, 4, 0x7FFFFFFF)
+                break
         self.fixed_size = sum(kind & 15 for kind in self._fixed_kinds)
         self.stride = sum(kind & 15 for kind in self._repeated_kinds)
         self.size_min = FIRST_SIZES.get(message_id, self.fixed_size)
@@ -155,6 +162,8 @@ class Message:
 
     def first_out_of_range(self, values: "array[int]", count: int) -> int:
         """The index of the first of `values` that is outside the schema's limits, -1 where all are within."""
+        if self._lows is None:
+            return -1
         end = self.fixed_values + count * self.stride_values
         return _first_out_of_range(values, self._lows, self._highs, self.fixed_values, self.stride_values, end)
 
@@ -163,11 +172,16 @@ BY_ID = {data[0]: Message(*data) for data in MESSAGES}
 BY_NAME = {message.name: message for message in BY_ID.values()}
 
 
-def schema_bytes() -> bytes:
-    """What the schema's CRC is taken of: everything that decides the bytes on the wire, in canonical form."""
-    parts = []
+def schema_lines() -> "Iterator[bytes]":
+    """`schema_bytes`, message by message: a small heap has no room for all of it at once."""
+    first = True
     for message_id, name, fixed, repeated, _ in MESSAGES:
         fields = ",".join("%s:%d" % (field[0], field[1]) for field in fixed)
         group = ",".join("%s:%d" % (field[0], field[1]) for field in repeated)
-        parts.append("%d %s(%s)[%s]" % (message_id, name, fields, group))
-    return "\n".join(parts).encode()
+        yield ("%s%d %s(%s)[%s]" % ("" if first else "\n", message_id, name, fields, group)).encode()
+        first = False
+
+
+def schema_bytes() -> bytes:
+    """What the schema's CRC is taken of: everything that decides the bytes on the wire, in canonical form."""
+    return b"".join(schema_lines())

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import signal
 import subprocess
 import sys
 import tty
@@ -138,14 +139,20 @@ def test_demo_prints_heights_and_draws(run, tmp_path):
 @pytest.mark.slow
 def test_sim_serves_other_programs_until_it_is_interrupted():
     command = [sys.executable, "-m", "bubbleskin", "sim", "--json", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
+    ) as server:
         try:
             device = json.loads(server.stdout.readline())["device"]
             show = [sys.executable, "-m", "bubbleskin", "show", "--shape", "dome", "--device", device]
             shown = subprocess.run(show, capture_output=True, text=True, timeout=60, check=False)
             assert shown.returncode == 0, shown.stderr
         finally:
-            server.send_signal(2)
+            server.send_signal(signal.SIGINT)
             _, err = server.communicate(timeout=20)
     assert server.returncode == 130
     assert err.strip() == "Stopped."

@@ -5,6 +5,7 @@ import zlib
 
 import pytest
 
+from bubble_firmware import boards
 from bubble_protocol import codec, steps
 from bubble_protocol.schema import errors, faults, messages, modes, sequences
 from bubble_protocol.schema.sequences import (
@@ -511,3 +512,30 @@ def test_events_that_find_no_room_are_missed_by_their_number(seven):
 def test_the_schemas_names_are_the_steps_own():
     assert codec.BY_NAME["SEQUENCE_WRITE"].fixed_size == 4
     assert (steps.HEAD, steps.LEAVE) == (4, 0xFFFF)
+
+
+def test_where_the_heap_is_small_the_memory_is_what_there_is_room_for(micropython):
+    said = micropython(
+        """
+        import gc
+        room = bytearray(60000)
+        from bubble_firmware import boards
+        from bubble_firmware.sequence.memory import SequenceMemory
+        board = boards.load("wristband7")
+        gc.collect()
+        taken = []
+        try:
+            while True:
+                taken.append(bytearray(1000))
+        except MemoryError:
+            pass
+        del room
+        memory = SequenceMemory(board)
+        gc.collect()
+        print(memory.capacity, gc.mem_free())
+        """
+    )
+    capacity, free = map(int, said.split())
+    board = boards.load("wristband7")
+    assert 0 < capacity < board.SEQUENCE_BYTES // (2 * (steps.HEAD + board.BUBBLES))
+    assert free > 20000, "what is made after it has no room"

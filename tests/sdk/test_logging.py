@@ -31,7 +31,7 @@ def test_every_frame_is_told_with_name_number_and_size(tapped, caplog):
     for line, size in ((out, len(tap.sent) - sent), (back, len(tap.received) - received)):
         number, told_size = re.search(r" (\d+), (\d+) bytes$", line).groups()
         assert int(told_size) == size
-        assert int(number) == 1
+        assert int(number) == 2, "after LAYOUT, which opened the skin"
     assert all(record.name.startswith("bubbleskin.link.") for record in caplog.records)
 
 
@@ -52,7 +52,7 @@ def test_what_is_sent_again_is_told(tapped, caplog):
     with caplog.at_level(logging.INFO, "bubbleskin.link"):
         lost.append(True)
         skin.state()
-    assert told(caplog, logging.INFO, "STATE 1 is sent again")
+    assert told(caplog, logging.INFO, "STATE 2 is sent again")
     assert not told(caplog, logging.DEBUG), "no frames"
 
 

@@ -1,8 +1,10 @@
 """Requests that open a session and keep it: HELLO, PING, SUBSCRIBE, SUBSCRIBE_FIELDS."""
 
+from array import array
+
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol import codec
-from bubble_protocol.crc import crc32_word
+from bubble_protocol.crc import crc32_on
 from bubble_protocol.frame import Decoder
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
@@ -85,8 +87,10 @@ class SessionHandlers(Handlers):
         self._name = (board.NAME.encode() + bytes(codec.TEXT_SIZE))[
             : codec.TEXT_SIZE
         ]  # a letter of a string can allocate
-        schema = codec.schema_bytes()
-        self._schema_crc = crc32_word(schema, 0, len(schema))
+        crc = array("i", (0,))
+        for line in codec.schema_lines():
+            crc32_on(line, 0, len(line), crc)
+        self._schema_crc = crc[0]
         boot_id = hal.boot_id & 0xFFFFFFFF
         self._boot_id = boot_id - (boot_id >> 31 << 32)  # the same 32 bits as a signed word
 

