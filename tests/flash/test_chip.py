@@ -87,6 +87,7 @@ def test_files_on_a_stock_micropython_run_as_a_uf2_does(built, tmp_path, board):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 def test_files_onto_a_stock_micropython_then_once_more(built, tmp_path):
     machine = EmulatedMachine(uf2.read(built[rp2040.STOCK]).data, tmp_path / "drive")
     machine.plug_in()
