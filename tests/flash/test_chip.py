@@ -87,6 +87,7 @@ def test_files_on_a_stock_micropython_run_as_a_uf2_does(built, tmp_path, board):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)
 def test_files_onto_a_stock_micropython_then_once_more(built, tmp_path):
     machine = EmulatedMachine("wristband7", uf2.read(built[frozen.STOCK]).data, tmp_path / "drive")
     machine.plug_in()

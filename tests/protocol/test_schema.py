@@ -3,7 +3,6 @@
 import pytest
 
 from bubble_firmware import boards
-from bubble_firmware.handlers.tables import KNOTS_PER_MESSAGE
 from bubble_protocol import codec, steps
 from bubble_protocol.frame import PAYLOAD_MAX
 from bubble_protocol.schema import (
@@ -110,7 +109,8 @@ def test_a_frame_has_room_for_every_bubble(name, entries):
     message = codec.BY_NAME[name]
     assert message.fixed_size + entries * message.stride <= PAYLOAD_MAX
     assert max(boards.load(board).BUBBLES for board in NAMES) <= BUBBLES
-    assert KNOTS_PER_MESSAGE == 48
+    tables = codec.BY_NAME["TABLE_WRITE"]
+    assert tables.fixed_size + messages.KNOTS_PER_MESSAGE * tables.stride <= PAYLOAD_MAX
 
 
 def test_every_message_fits_a_frame():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-TOOL = Path(__file__).parents[2] / "tools" / "day.py"
+TOOL = Path(__file__).parents[2] / "tools/stress/day.py"
 
 
 @pytest.mark.slow

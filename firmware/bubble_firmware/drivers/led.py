@@ -3,8 +3,10 @@
 
 from bubble_protocol.mpy_compat import const, micropython, ptr32
 
-_SET = const(5)
-_CLEAR = const(6)
+# [constants] bubble_firmware.drivers.sio: GPIO_OUT_SET GPIO_OUT_CLR
+_GPIO_OUT_SET = const(5)
+_GPIO_OUT_CLR = const(6)
+# [end of constants]
 
 
 @micropython.viper
@@ -15,4 +17,4 @@ def show(gpio: ptr32, pin: int, ticks: int, lit: int, faults: int):
         lit = beat >> 3 & 1
     elif beat < 4:
         lit = 1
-    gpio[_SET if lit else _CLEAR] = 1 << pin
+    gpio[_GPIO_OUT_SET if lit else _GPIO_OUT_CLR] = 1 << pin

@@ -17,15 +17,18 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
 
 SPI0 = 0x4003C000
 SIO = 0xD0000000
-ABSENT = 0xFFFF
-"""Stands for a count where no chip has answered."""
+
+# [constants] bubble_firmware.hal.base: ABSENT
+# [constants] bubble_firmware.drivers.sio: GPIO_OUT_SET GPIO_OUT_CLR
+_ABSENT = const(65535)
+_GPIO_OUT_SET = const(5)
+_GPIO_OUT_CLR = const(6)
+# [end of constants]
 
 _DR = const(2)  # words of the SPI block
 _SR = const(3)
 _BUSY = const(16)  # SR
 _NOT_EMPTY = const(4)
-_SET = const(5)  # words of the GPIO block: pins high, pins low
-_CLEAR = const(6)
 _HIGH = const(8)  # turns that are at least the 500 ns that the chip must be deselected
 
 
@@ -44,13 +47,13 @@ def read(registers, gpio, select: int, channels: int, counts, at: int) -> int:
         spi[_DR]
     channel = 0
     while channel < channels:
-        pin[_CLEAR] = mask
+        pin[_GPIO_OUT_CLR] = mask
         spi[_DR] = 6 | channel >> 2
         spi[_DR] = (channel & 3) << 6
         spi[_DR] = 0
         while spi[_SR] & _BUSY:
             pass
-        pin[_SET] = mask
+        pin[_GPIO_OUT_SET] = mask
         spi[_DR]
         high = spi[_DR]
         low = spi[_DR]

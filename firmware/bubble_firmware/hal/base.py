@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 LISTEN = const(-1)
 """What `Hal.wait` returns between two ticks, when there is time for a look at the link."""
 
+ABSENT = const(0xFFFF)
+"""What `Hal.read_sensors` puts in place of a count where no chip has answered."""
+
 
 class Hal:
     """The hardware of `board`; as it stands here, a board at rest with nobody at the other end of its link.

@@ -12,12 +12,14 @@ if TYPE_CHECKING:
     from bubble_firmware.control.table import Tables
     from bubble_firmware.link.reply import Reply
 
+# [constants] bubble_protocol.schema.messages: KNOTS_PER_MESSAGE
 # [constants] bubble_protocol.schema.messages: TABLE_WRITE TABLE_COMMIT TABLE_READ
 # [constants] bubble_protocol.schema.errors: BAD_CRC BAD_TABLE NO_ELEMENT OUT_OF_RANGE
 # [constants] message TABLE_WRITE as WRITE: *
 # [constants] message TABLE_COMMIT as COMMIT: CRC
 # [constants] message TABLE_COMMIT_REPLY as COMMITTED: TABLES_CRC
 # [constants] message TABLE_READ_REPLY as READ: *
+_KNOTS_PER_MESSAGE = const(48)
 _TABLE_WRITE = const(8)
 _TABLE_COMMIT = const(9)
 _TABLE_READ = const(10)
@@ -40,8 +42,6 @@ _READ_KNOT_UM = const(3)
 _READ_KNOT_PA = const(4)
 _READ_STRIDE = const(2)
 # [end of constants]
-
-KNOTS_PER_MESSAGE = const(48)
 
 
 class TableHandlers(Handlers):
@@ -106,8 +106,8 @@ class TableHandlers(Handlers):
             self._reply.refuse(_OUT_OF_RANGE, _READ_FIRST, _NO_ELEMENT, first, 0, total - 1)
             return
         count = total - first
-        if count > KNOTS_PER_MESSAGE:
-            count = KNOTS_PER_MESSAGE
+        if count > _KNOTS_PER_MESSAGE:
+            count = _KNOTS_PER_MESSAGE
         values[_READ_TOTAL] = total
         at = _READ_KNOT_UM
         for index in range(first, first + count):

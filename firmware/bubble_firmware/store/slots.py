@@ -24,11 +24,13 @@ if TYPE_CHECKING:
     from bubble_firmware.store.record import Content
 
 # [constants] bubble_firmware.drivers.flash: PAGE SECTOR
+# [constants] bubble_protocol.frame: CRC
 # [constants] bubble_protocol.schema.errors: STORE_FAILED STORE_FOREIGN
 # [constants] bubble_protocol.schema.store: DAMAGED FACTORY FOREIGN NO_STORE SLOT_A
 # [constants] bubble_protocol.schema.store: SLOT_BLANK SLOT_CORRUPT SLOT_FOREIGN SLOT_REJECTED SLOT_VALID
 _PAGE = const(256)
 _SECTOR = const(4096)
+_CRC = const(4)
 _STORE_FAILED = const(17)
 _STORE_FOREIGN = const(16)
 _DAMAGED = const(3)
@@ -52,7 +54,6 @@ _NAME = const(20)
 _NAME_SIZE = const(16)
 _HEADER_CRC = const(36)
 _HEADER = const(40)  # bytes of it
-_CRC = const(4)
 _GENERATIONS = const(0x10000)
 
 

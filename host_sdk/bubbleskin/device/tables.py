@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bubble_protocol.schema import messages
 from bubbleskin.device.info import Info
 from bubbleskin.errors import DeviceRefused, InvalidInput
 from bubbleskin.link.link import Call, Link
@@ -14,8 +15,6 @@ from bubbleskin.link.upload import upload as send
 if TYPE_CHECKING:  # the membrane loads scipy, for which a script that only shows heights need not wait
     from bubbleskin.membrane.calibration import Calibration
     from bubbleskin.membrane.table import Table
-
-_KNOTS_PER_MESSAGE = 48
 
 
 def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) -> "list[Table]":
@@ -45,8 +44,8 @@ async def upload(link: Link, tables: "Sequence[Table]") -> None:
 def _writes(bubble: int, table: bytes) -> list[Call]:
     knots = np.frombuffer(table, "<u2").reshape(-1, 2).tolist()
     return [
-        ("TABLE_WRITE", (bubble, first, len(knots)), knots[first : first + _KNOTS_PER_MESSAGE])
-        for first in range(0, len(knots), _KNOTS_PER_MESSAGE)
+        ("TABLE_WRITE", (bubble, first, len(knots)), knots[first : first + messages.KNOTS_PER_MESSAGE])
+        for first in range(0, len(knots), messages.KNOTS_PER_MESSAGE)
     ]
 
 

@@ -20,6 +20,8 @@ KIND_NAMES = {U8: "u8", U16: "u16", U32: "u32", I16: "i16", I32: "i32", TEXT: "t
 
 REPLY = const(0x80)
 
+KNOTS_PER_MESSAGE = const(48)  # at most, in TABLE_WRITE and TABLE_READ_REPLY
+
 HELLO = const(0x01)
 PING = const(0x02)
 INFO = const(0x03)
