@@ -1,7 +1,6 @@
 """Sequences on the device: their schedule to the tick, conditions, repeats, streams, and everything that is refused."""
 
 import random
-import zlib
 
 import pytest
 
@@ -18,7 +17,6 @@ from bubble_protocol.schema.sequences import (
     SEQUENCE_PAUSED,
     SEQUENCE_RESUMED,
     STEP_BEGUN,
-    UNDERRUN,
     UNENDED,
 )
 
@@ -324,189 +322,6 @@ def test_another_takes_over_where_the_bubbles_are(seven):
     seven.start()
     seven.until_ended()
     assert seven.events[-1][1] == COMPLETE
-
-
-# Streams.
-
-
-@pytest.mark.slow
-def test_a_stream_plays_on_while_it_is_written(sequencer):
-    ring = sequencer.rig.app.player.sequence.capacity
-    most = 121 // sequencer.size
-    tick = sequencer.rig.board.TICK_US // 1000
-    total = 2 * ring + 17
-    records = [sequencer.all(5000 + k % 9000, after=tick) for k in range(total)]
-    sequencer.begin(total)
-    written = 0
-    while written < ring:
-        part = records[written : min(written + most, ring)]
-        assert sequencer.write(written, part)["received"] == written + len(part)
-        written += len(part)
-    assert (
-        sequencer.refusal("SEQUENCE_WRITE", 7, ring & 0xFFFF, repeated=[(w,) for w in records[ring]])[0]
-        == errors.NO_ROOM
-    )
-    sequencer.ask("SEQUENCE_ARM", 7)
-    start = sequencer.start()
-    while written < total:
-        part = records[written : written + most]
-        answer = sequencer.write(written, part)
-        if answer.id == messages.ERROR:
-            assert answer["error"] == errors.NO_ROOM
-            sequencer.tick(3)
-        else:
-            written += len(part)
-    sequencer.until_ended()
-    assert sequencer.events[-1] == (SEQUENCE_ENDED, COMPLETE, total - 1, start + total)
-    assert sequencer.begun() == list(range(start, start + total)), "no gap"
-
-
-def test_a_stream_that_runs_dry_is_held_and_says_so(seven):
-    ring = seven.rig.app.player.sequence.capacity
-    seven.begin(0)
-    written = 0
-    while written < ring:
-        part = min(11, ring - written)
-        seven.write(written, [seven.all(6000 + written, after=5)] * part)
-        written += part
-    seven.ask("SEQUENCE_ARM", 7)
-    start = seven.start()
-    seven.until_ended()
-    assert seven.events[-1] == (SEQUENCE_ENDED, UNDERRUN, ring - 1, start + ring)
-    assert seven.rig.app.safety.mode == modes.ACTIVE
-    assert seven.setpoints() == [6000 + ring - ring % 11] * 7
-
-
-def test_a_stream_has_no_repeats(seven):
-    seven.begin(0)
-    error = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in seven.repeat(2)])
-    assert error == (errors.BAD_LOOP, WHOLE, 0, 1, 0, 0)
-
-
-# Refused.
-
-
-def test_what_is_for_other_hardware_is_refused(sequencer):
-    name = zlib.crc32(sequencer.rig.board.NAME.encode())
-    assert sequencer.begin(3, board=name).id != messages.ERROR
-    assert sequencer.begin(3, board=name ^ 1)["error"] == errors.WRONG_BOARD
-    n = sequencer.n
-    assert sequencer.begin(3, board=name, bubbles=n + 1)["error"] == errors.WRONG_COUNT
-    assert sequencer.state()["state"] == sequences.LOADING, "refused, so nothing has changed"
-
-
-BAD = [
-    ({"ramp": 60001}, errors.BAD_STEP, 1, 60001, 0, 60000),
-    ({"after": 60001}, errors.BAD_STEP, 2, 60001, 0, 60000),
-    ({"after": 4}, errors.BAD_STEP, 2, 4, 5, 60000),
-    ({"tolerance": 49, "timeout": 100}, errors.BAD_STEP, 3, 49, 50, 5000),
-    ({"tolerance": 5001, "timeout": 100}, errors.BAD_STEP, 3, 5001, 50, 5000),
-    ({"tolerance": 100, "timeout": 0}, errors.BAD_STEP, 2, 0, 5, 60000),
-]
-
-
-@pytest.mark.parametrize(("how", "error", "word", "asked", "low", "high"), BAD)
-def test_a_bad_step_is_refused_and_named(seven, how, error, word, asked, low, high):
-    good = seven.all(8000, after=50)
-    seven.begin(4)
-    bad = seven.all(8000, **how)
-    answer = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for r in (good, good, bad, good) for w in r])
-    assert answer == (error, word, 2, asked, low, high)
-    assert seven.state()["received"] == 0, "none of them was taken"
-
-
-def test_a_target_above_the_limit_is_refused(sequencer):
-    high = sequencer.rig.board.HEIGHT_MAX_UM
-    for um in (high + 1, 0xFFFE):
-        bad = sequencer.all(8000, after=50)
-        bad[4 + 3] = um
-        sequencer.begin(1)
-        refused = sequencer.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in bad])
-        assert refused == (errors.BAD_STEP, 4 + 3, 0, um, 0, high)
-
-
-def test_flags_that_mean_nothing_are_refused(seven):
-    for flags in (3, 0x80, 0x8000, 4 | 1, 0x20):
-        seven.begin(1)
-        bad = [flags, 100, 100, 0, *[8000] * 7]
-        assert seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in bad])[0] in (
-            errors.BAD_STEP,
-            errors.BAD_LOOP,
-        )
-
-
-def test_repeats_that_do_not_fit_are_refused(seven):
-    one = seven.all(8000, after=50)
-    repeat, end = seven.repeat(2), seven.end()
-    for records, where in (([end], 0), ([repeat, end], 1), ([repeat, one, end, end], 3), ([repeat] * 5, 4)):
-        seven.begin(len(records))
-        refused = seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for r in records for w in r])
-        assert refused[:3] == (errors.BAD_LOOP, WHOLE, where)
-    seven.upload([repeat, one])
-    assert seven.refusal("SEQUENCE_ARM", 7)[0] == errors.NOT_READY, "one that is not ended"
-
-
-def test_what_is_not_whole_or_not_that_is_not_armed(seven):
-    one = seven.all(8000, after=50)
-    assert seven.refusal("SEQUENCE_ARM", 7) == (errors.NOT_READY, 0, WHOLE, sequences.EMPTY, 0, 0)
-    assert seven.refusal("SEQUENCE_WRITE", 7, 0, repeated=[(w,) for w in one])[0] == errors.NOT_READY
-    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == errors.NOT_READY
-    assert seven.refusal("SEQUENCE_CONTROL", 7, sequences.PAUSE)[0] == errors.NOT_READY
-    seven.begin(3, crc=1)
-    seven.write(0, [one, one])
-    assert seven.refusal("SEQUENCE_ARM", 7) == (errors.NOT_READY, 0, WHOLE, sequences.LOADING, 2, 3)
-    assert seven.refusal("SEQUENCE_ARM", 8)[0] == errors.NOT_READY, "another one"
-    assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(w,) for w in one]) == (
-        errors.OUT_OF_ORDER,
-        1,
-        WHOLE,
-        3,
-        2,
-        2,
-    )
-    seven.write(2, [one])
-    assert seven.write(2, [one])["received"] == 3, "sent twice because the answer was lost"
-    assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(w,) for w in one])[:2] == (errors.NO_ROOM, 2)
-    assert seven.refusal("SEQUENCE_ARM", 7)[0] == errors.BAD_CRC
-    assert seven.refusal("SEQUENCE_START", 7, 0)[0] == errors.NOT_READY
-    for count in (0, 1, 10, 12, 120):
-        assert seven.refusal("SEQUENCE_WRITE", 7, 3, repeated=[(1,)] * count)[0] == errors.WRONG_LENGTH
-
-
-def test_an_upload_cut_half_way_is_forgotten_by_the_next(seven):
-    seven.begin(30)
-    seven.write(0, [seven.repeat(2), seven.all(8000, after=50)])
-    seven.id = 8
-    start = seven.play(seven.all(6000, after=50), seven.all(7000, after=50))
-    seven.until_ended()
-    assert seven.begun() == [start, start + 10]
-    assert {one["sequence"] for one in seven.told} == {8}
-
-
-def test_more_than_the_memory_is_a_stream_and_room_is_told(sequencer):
-    board = sequencer.rig.board
-    ring = sequencer.begin(1)["capacity"]
-    assert ring >= 1000
-    assert ring * 2 * sequencer.size <= board.SEQUENCE_BYTES
-    assert sequencer.begin(ring)["free"] == ring
-    assert sequencer.begin(ring + 1)["free"] == ring
-    assert sequencer.begin(0xFFFFFFFF)["free"] == ring
-    assert sequencer.begin(3)["free"] == 3
-
-
-def test_events_that_find_no_room_are_missed_by_their_number(seven):
-    seven.load(*(seven.all(6000, after=5) for _ in range(60)))
-    seven.start()
-    seven.rig.hal.full = True
-    for _ in range(40):
-        seven.rig.app.tick()
-    seven.rig.hal.full = False
-    seven.until_ended()
-    numbers = [one.sequence for one in seven.told]
-    assert numbers[-1] == 60
-    assert len(numbers) < 61
-    assert seven.told[-1]["event"] == SEQUENCE_ENDED
-    assert [one["record"] for one in seven.told[:-1]] == numbers[:-1], "none is told twice, none out of turn"
 
 
 def test_the_schemas_names_are_the_steps_own():

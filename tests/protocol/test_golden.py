@@ -12,7 +12,7 @@ import pytest
 
 from bubble_protocol import codec
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.link.message import SCHEMA_CRC, _signed, encode
+from bubbleskin.link.message import SCHEMA_CRC, encode, signed_word
 from bubbleskin.link.reader import Reader
 
 GOLDEN = json.loads((Path(__file__).parent / "golden.json").read_text(encoding="utf-8"))
@@ -57,7 +57,7 @@ def test_the_host_understands_the_frame(vector):
 def test_the_device_makes_and_understands_the_frames(micropython):
     lines = []
     for vector in GOLDEN["vectors"]:
-        values = array("i", map(_signed, [*fixed_values(vector), *chain(*vector["repeated"])]))
+        values = array("i", map(signed_word, [*fixed_values(vector), *chain(*vector["repeated"])]))
         lines.append(
             " ".join(
                 [
@@ -108,4 +108,4 @@ def test_the_device_makes_and_understands_the_frames(micropython):
         """,
         stdin="\n".join(lines) + "\n",
     )
-    assert said.split() == [str(len(GOLDEN["vectors"])), str(_signed(GOLDEN["schema_crc"]))]
+    assert said.split() == [str(len(GOLDEN["vectors"])), str(signed_word(GOLDEN["schema_crc"]))]

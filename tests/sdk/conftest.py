@@ -182,18 +182,18 @@ class Tap(Transport):
         self.name = transport.name
         self.sent = bytearray()
         self.received = bytearray()
-        self._transport = transport
-        self._change = change
-        self._change_sent = change_sent
+        self.transport = transport
+        self.change = change
+        self.change_sent = change_sent
 
     def read(self, timeout):
-        data = self._change(self._transport.read(timeout))
+        data = self.change(self.transport.read(timeout))
         self.received += data
         return data
 
     def write(self, data):
         self.sent += data
-        self._transport.write(self._change_sent(data))
+        self.transport.write(self.change_sent(data))
 
     def understood(self, data):
         """The messages of the open session in `data`, but for the PINGs that keep the link alive and their replies."""
@@ -201,10 +201,10 @@ class Tap(Transport):
         return [message for message in reader.feed(bytes(data)) if message.id & 0x7F != messages.PING]
 
     def now(self):
-        return self._transport.now()
+        return self.transport.now()
 
     def close(self):
-        self._transport.close()
+        self.transport.close()
 
 
 @pytest.fixture

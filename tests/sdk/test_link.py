@@ -171,7 +171,7 @@ def test_telemetry_ends_with_its_iterator(tapped):
 def test_telemetry_in_pieces_is_whole(tapped):
     skin, _ = tapped()
     link = skin.link
-    read = link.transport._transport.read
+    read = link.transport.transport.read
     rest = bytearray()
 
     def one_byte(timeout):
@@ -181,7 +181,7 @@ def test_telemetry_in_pieces_is_whole(tapped):
         del rest[:1]
         return data
 
-    link.transport._transport.read = one_byte
+    link.transport.transport.read = one_byte
     times = [state.time for state in islice(skin.telemetry(100), 20)]
     assert np.diff(times) == pytest.approx(0.01)
 

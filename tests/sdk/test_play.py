@@ -79,7 +79,7 @@ def test_an_upload_cut_half_way_and_a_new_one(tapped):
                 raise bs.LinkError("the plug is pulled.")
         return data
 
-    tap._change_sent = cut
+    tap.change_sent = cut
     with pytest.raises(bs.LinkError):
         skin.play(bs.Sequence([bs.Step(UP, 0.1)] * 100))
     again = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, "again"), 2.0, simulated=board)))
@@ -133,7 +133,7 @@ def test_a_stream_without_end_plays_until_it_is_stopped(narrow):
 
 def test_a_stream_that_runs_dry_is_a_fault_that_is_named(narrow):
     skin, tap = narrow
-    tap._change_sent = lambda data: (
+    tap.change_sent = lambda data: (
         b"" if skin.simulated.time < held[0] and len(data) > 1 and data[1] == messages.SEQUENCE_WRITE else data
     )
     held = [0.0]

@@ -70,12 +70,12 @@ def encode(
     try:
         end = struct_codec.pack(frame, Decoder.PAYLOAD_AT, fixed, repeated)
     except struct.error:  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
-        values = array("i", map(_signed, chain(fixed, *repeated)))
+        values = array("i", map(signed_word, chain(fixed, *repeated)))
         end = message.pack(values, len(repeated), frame, Decoder.PAYLOAD_AT)
     put_header(frame, message.id, sequence)
     return bytes(frame[: finish_frame(frame, end - 1, crc32_into, key)])
 
 
-def _signed(value: int) -> int:
+def signed_word(value: int) -> int:
     """A number as a signed 32-bit word."""
     return ((int(value) & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000
