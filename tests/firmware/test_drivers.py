@@ -8,6 +8,7 @@ from bubble_firmware import boards
 from bubble_firmware.drivers import clock, mcp3208, pca9685, pwm
 from bubble_firmware.drivers.abp2 import Abp2
 from bubble_firmware.drivers.tca9548a import Tca9548a
+from bubble_firmware.hal.base import ABSENT
 
 # ---- PWM
 
@@ -129,7 +130,7 @@ def test_every_channel_and_every_bit_arrives():
 def test_a_missing_converter_is_told_from_any_count():
     counts = array("H", bytes(16))
     assert mcp3208.read(Spi(lambda byte: 0xFF), Gpio(lambda mask, high: None), 17, 8, counts, 0) == 0
-    assert counts.tolist() == [mcp3208.ABSENT] * 8
+    assert counts.tolist() == [ABSENT] * 8
 
 
 # ---- I2C
@@ -349,8 +350,8 @@ def test_a_missing_digital_sensor_is_one_missing_sensor():
     counts = array("H", bytes(6))
     sensors.read(counts, 0)
     assert sensors.read(counts, 0) == 2
-    assert counts[1] == mcp3208.ABSENT
-    assert counts[0] == counts[2] != mcp3208.ABSENT
+    assert counts[1] == ABSENT
+    assert counts[0] == counts[2] != ABSENT
 
 
 def test_without_the_switch_every_sensor_is_missing_and_comes_back():
@@ -362,6 +363,6 @@ def test_without_the_switch_every_sensor_is_missing_and_comes_back():
     sensors.read(counts, 0)
     del bus.chips[0x70]
     assert sensors.read(counts, 0) == 0
-    assert counts.tolist() == [mcp3208.ABSENT] * 2
+    assert counts.tolist() == [ABSENT] * 2
     bus.chips[0x70] = switch
     assert any(sensors.read(counts, 0) == 2 for _ in range(1000))

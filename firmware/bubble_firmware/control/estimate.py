@@ -15,6 +15,7 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 
 # [constants] bubble_firmware.control.state_layout: used
 # [constants] bubble_protocol.schema.faults: used
+# [constants] bubble_firmware.hal.base: ABSENT
 _SENSOR_ZERO = const(0)
 _PRESSURE = const(4)
 _SUSPECT = const(5)
@@ -57,15 +58,15 @@ _PRESSURE_MAX = const(5)
 _CONTROL_MODE = const(16)
 _ROWS = const(150)
 _READINGS_MIN = const(2)
+_SAMPLES_MAX = const(64)
+_INNOVATION_UM = const(500)
+_INNOVATION_PA = const(500)
 _OVERPRESSURE = const(1)
 _SENSOR_LOST = const(2)
+_ABSENT = const(65535)
 # [end of constants]
 
 _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps every product of control within 32 bits
-_SAMPLES_MAX = const(64)
-_INNOVATION_UM = const(500)  # further off than metering ever is,
-_INNOVATION_PA = const(500)  # by more than noise: believe the sensor afresh
-_ABSENT = const(0xFFFF)  # a count that says: no chip has answered. That is no noise
 
 
 @micropython.viper
@@ -94,6 +95,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, mode: int):
             row[_DECIMATION_LEFT] = -1
             if count <= board[_COUNT_LOW] or count >= board[_COUNT_HIGH]:
                 row[_SUSPECT] = 1
+                # A chip that has not answered is no noise: that one reading is enough.
                 row[_LOST_TICKS] = row[_LOST_TICKS] + 1 if count < _ABSENT else _READINGS_MIN
                 pressure = row[_PRESSURE]
             else:

@@ -10,13 +10,18 @@ the last time, so the tick, which must not be shorter than 5 ms, never waits. At
 A sensor that does not answer is ABSENT and asked again after a while, because asking costs memory.
 """
 
+from bubble_protocol.mpy_compat import const
+
+# [constants] bubble_firmware.hal.base: ABSENT
+_ABSENT = const(65535)
+# [end of constants]
+
 _ADDRESS = 0x28
 _START = b"\xaa\x00\x00"
 _POWERED = 0x40
 _TENTH = 6554  # a tenth of 2**16: pressure without its last byte is used
 _SPAN = 52429  # eight tenths
 _AGAIN = 200  # reads
-ABSENT = 0xFFFF
 
 
 class Abp2:
@@ -44,7 +49,7 @@ class Abp2:
         for channel in range(self.sensors):
             count = self._read(channel)
             counts[at + channel] = count
-            if count != ABSENT:
+            if count != _ABSENT:
                 answers += 1
         self._started = answers > 0
         if self._select(self._all):
@@ -57,18 +62,18 @@ class Abp2:
 
     def _read(self, channel):
         if not self._started:
-            return ABSENT
+            return _ABSENT
         if self._rest[channel]:
             self._rest[channel] -= 1
-            return ABSENT
+            return _ABSENT
         if not self._select(1 << channel):
-            return ABSENT
+            return _ABSENT
         reply = self._reply
         try:
             self._bus.readfrom_into(_ADDRESS, reply)
         except OSError:
             self._rest[channel] = _AGAIN
-            return ABSENT
+            return _ABSENT
         if reply[0] != _POWERED:
             return 0  # an end of the range: one may be noise
         count = self._zero + (((reply[1] << 8 | reply[2]) - _TENTH) * self._gain + 32768 >> 16)

@@ -17,8 +17,10 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
 
 SPI0 = 0x4003C000
 SIO = 0xD0000000
-ABSENT = 0xFFFF
-"""Stands for a count where no chip has answered."""
+
+# [constants] bubble_firmware.hal.base: ABSENT
+_ABSENT = const(65535)
+# [end of constants]
 
 _DR = const(2)  # words of the SPI block
 _SR = const(3)
@@ -55,7 +57,7 @@ def read(registers, gpio, select: int, channels: int, counts, at: int) -> int:
         high = spi[_DR]
         low = spi[_DR]
         if high & 16:
-            count[at] = 0xFFFF
+            count[at] = _ABSENT
         else:
             count[at] = (high & 15) << 8 | low
             answers += 1

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
             """Clear the bits of the page at `offset` that are clear in `page`."""
 
 
+ABSENT = const(0xFFFF)
+"""What `Hal.read_sensors` gives for a count where no chip has answered."""
+
 LISTEN = const(-1)
 """What `Hal.wait` returns between two ticks, when there is time for a look at the link."""
 
@@ -63,7 +66,7 @@ class Hal:
     # Sensors and valves.
 
     def read_sensors(self, counts: "array[int]") -> None:
-        """Fill in one count for each bubble, then the supply's; 0xFFFF where no chip answers."""
+        """Fill in one count for each bubble, then the supply's; ABSENT where no chip answers."""
         board = self.board
         for index in range(board.BUBBLES):
             counts[index] = board.SENSOR_ZERO
