@@ -97,7 +97,7 @@ SAMPLES_MAX = const(64)
 SAMPLES_DOSED = const(16)  # left after a short dose, which is metered well
 INNOVATION_UM = const(500)  # further off than metering ever is,
 INNOVATION_PA = const(500)  # by more than noise: believe the sensor afresh
-DECIMATION = const(3)  # readings of a quiescent bubble that are summed; with the one after them they make a mean of four
+DECIMATION = const(3)  # readings of a quiescent bubble that are summed before the one that makes the mean
 INTEGRAL_MAX = const(1 << 17)  # µJ ticks
 DOSE_MAX = const(50000)  # µJ, more than any period brings
 

@@ -36,7 +36,6 @@ _PHASES = (
 _EDGES = (layout.FIRST_SEGMENT, layout.LAST_SEGMENT)
 _CHUNK = 20  # ticks sent to the prompt at once
 _SAME_US = 20  # so near, two pulses count as one
-_SAME_UM = 50
 
 _HARNESS = """
 from array import array
@@ -96,15 +95,19 @@ class Replayed(NamedTuple):
     pulses: NDArray[np.int64]
 
 
-def rows() -> Iterator[Row]:
-    """Control work against the same law in float bytecode; then whole ticks of both boards."""
-    yield from _control_rows(boards.DEFAULT)
+def rows(size: float = 1.0) -> Iterator[Row]:
+    """Control work against the same law in float bytecode; then whole ticks of both boards. Less `size`, shorter runs."""
+    yield from control_rows(boards.DEFAULT, size)
     for board in boards.NAMES:
-        yield from tick_rows(board)
+        yield from tick_rows(board, 5.0 * size)
 
 
-def _control_rows(board: str) -> Iterator[Row]:
-    ticks = record(board, _PHASES)
+def control_rows(board: str, size: float = 1.0) -> Iterator[Row]:
+    """Control work by phase, at fixed point and in floats.
+
+    A `BubbleskinError` where the chip decides otherwise than the simulator, or the law in floats otherwise than both.
+    """
+    ticks = record(board, [(name, size * seconds, every, ramp) for name, seconds, every, ramp in _PHASES])
     bare = firmware([BARE])[BARE]
     fixed = replay(board, ticks, bare, _FIXED)
     if fixed.pulses.tolist() != [tick.pulses for tick in ticks]:
