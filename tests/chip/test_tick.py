@@ -15,7 +15,7 @@ def test_no_tick_is_late_and_the_heap_stays_as_it_is(uf2, name):
     uf2(name)  # built, or the test is skipped
     busy = load(name, 1.0)
     tick = boards.load(name).TICK_US
-    assert busy.ticks * tick == pytest.approx(1e6, rel=0.05)
+    assert busy.ticks * tick == pytest.approx(busy.elapsed_us, abs=2 * tick), "ticks are missing, or not counted"
     assert busy.telemetry >= 45
     assert busy.late == 0
     assert busy.heap_lost == 0, "something allocates in every tick, or at every request"

@@ -81,7 +81,9 @@ def test_files_on_a_stock_micropython_run_as_a_uf2_does(built, tmp_path, board):
         skin.sleep(0.2)
         after = skin.health()
         worked = skin.tick_histogram().worked - ticks
-        assert (after.exceptions, after.late_ticks) == (0, before.late_ticks)
+        # The tick that answered `before` is long with code on the heap: the next one begins late. No other does.
+        assert after.exceptions == 0
+        assert after.late_ticks - before.late_ticks <= 1
         assert worked[-1] < worked.sum() / 4, "all ticks take half of their time: there is no room at the heap's start"
         assert min(emulated.height_mm) > 7.0
 

@@ -56,6 +56,10 @@ _REST_UM = const(15)
 _ROOTS = const(20)
 _ROOT_STEPS = const(64)
 _ATMOSPHERE = const(101325)
+_SAMPLES_DOSED = const(16)
+_DECIMATION = const(3)
+_INTEGRAL_MAX = const(131072)
+_DOSE_MAX = const(50000)
 _VENT = const(0)
 _FOLLOW = const(1)
 _RESTING = const(0)
@@ -66,12 +70,6 @@ _FAULT = const(4)
 _VALVE_TIME = const(4)
 # [end of constants]
 
-_SAMPLES_DOSED = const(16)  # left after a short dose, which is metered well
-_INTEGRAL_MAX = const(1 << 17)
-_DOSE_MAX = const(50000)  # µJ, more than any period brings
-_DECIMATION = const(
-    3
-)  # readings of a quiescent bubble that are summed; with the one after them they make a mean of four
 _ROOT_END = const(8191)  # the last place in a table of roots, *128
 
 

@@ -14,8 +14,8 @@ passes that follow whether a bubble is decided upon in this tick.
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 
 # [constants] bubble_firmware.control.state_layout: used
-# [constants] bubble_firmware.hal.base: ABSENT
 # [constants] bubble_protocol.schema.faults: used
+# [constants] bubble_firmware.hal.base: ABSENT
 _SENSOR_ZERO = const(0)
 _PRESSURE = const(4)
 _SUSPECT = const(5)
@@ -58,15 +58,15 @@ _PRESSURE_MAX = const(5)
 _CONTROL_MODE = const(16)
 _ROWS = const(150)
 _READINGS_MIN = const(2)
-_ABSENT = const(65535)
+_SAMPLES_MAX = const(64)
+_INNOVATION_UM = const(500)
+_INNOVATION_PA = const(500)
 _OVERPRESSURE = const(1)
 _SENSOR_LOST = const(2)
+_ABSENT = const(65535)
 # [end of constants]
 
 _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps every product of control within 32 bits
-_SAMPLES_MAX = const(64)
-_INNOVATION_UM = const(500)  # further off than metering ever is,
-_INNOVATION_PA = const(500)  # by more than noise: believe the sensor afresh
 
 
 @micropython.viper
@@ -95,7 +95,8 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, mode: int):
             row[_DECIMATION_LEFT] = -1
             if count <= board[_COUNT_LOW] or count >= board[_COUNT_HIGH]:
                 row[_SUSPECT] = 1
-                row[_LOST_TICKS] = row[_LOST_TICKS] + 1 if count < _ABSENT else _READINGS_MIN  # no answer is no noise
+                # A chip that has not answered is no noise: that one reading is enough.
+                row[_LOST_TICKS] = row[_LOST_TICKS] + 1 if count < _ABSENT else _READINGS_MIN
                 pressure = row[_PRESSURE]
             else:
                 row[_LOST_TICKS] = 0

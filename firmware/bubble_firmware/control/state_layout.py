@@ -92,6 +92,15 @@ ROWS = const(150)
 ATMOSPHERE = const(101325)  # Pa
 READINGS_MIN = const(2)  # in a row that make a fault: one alone is noise
 
+# The law's own numbers, the same for all boards.
+SAMPLES_MAX = const(64)
+SAMPLES_DOSED = const(16)  # left after a short dose, which is metered well
+INNOVATION_UM = const(500)  # further off than metering ever is,
+INNOVATION_PA = const(500)  # by more than noise: believe the sensor afresh
+DECIMATION = const(3)  # readings of a quiescent bubble that are summed before the one that makes the mean
+INTEGRAL_MAX = const(1 << 17)  # µJ ticks
+DOSE_MAX = const(50000)  # µJ, more than any period brings
+
 # What control is to do with all bubbles: open the vents, follow the setpoints, keep all valves closed.
 VENT = const(0)
 FOLLOW = const(1)

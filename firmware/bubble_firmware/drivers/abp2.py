@@ -12,16 +12,16 @@ A sensor that does not answer is ABSENT and asked again after a while, because a
 
 from bubble_protocol.mpy_compat import const
 
+# [constants] bubble_firmware.hal.base: ABSENT
+_ABSENT = const(65535)
+# [end of constants]
+
 _ADDRESS = 0x28
 _START = b"\xaa\x00\x00"
 _POWERED = 0x40
 _TENTH = 6554  # a tenth of 2**16: pressure without its last byte is used
 _SPAN = 52429  # eight tenths
 _AGAIN = 200  # reads
-
-# [constants] bubble_firmware.hal.base: ABSENT
-_ABSENT = const(65535)
-# [end of constants]
 
 
 class Abp2:

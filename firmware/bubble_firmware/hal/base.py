@@ -66,7 +66,7 @@ class Hal:
     # Sensors and valves.
 
     def read_sensors(self, counts: "array[int]") -> None:
-        """Fill in one count for each bubble, then the supply's; 0xFFFF where no chip answers."""
+        """Fill in one count for each bubble, then the supply's; ABSENT where no chip answers."""
         board = self.board
         for index in range(board.BUBBLES):
             counts[index] = board.SENSOR_ZERO

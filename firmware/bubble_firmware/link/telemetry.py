@@ -2,7 +2,6 @@
 
 from array import array
 
-from bubble_firmware.control import state_layout as layout
 from bubble_protocol import codec, frame
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
@@ -13,9 +12,18 @@ if TYPE_CHECKING:
     from bubble_firmware.control.bubbles import Bubbles
     from bubble_firmware.link.sender import Sender
 
+# [constants] bubble_firmware.control.state_layout: used
 # [constants] bubble_protocol.schema.messages: TELEMETRY TELEMETRY_FIELDS
 # [constants] message TELEMETRY as TELEMETRY: TICKS MODE HEIGHT_UM
 # [constants] message TELEMETRY_FIELDS as FIELDS: *
+_PRESSURE = const(4)
+_FILL_US = const(18)
+_VENT_US = const(19)
+_FAULTS = const(21)
+_STATUS = const(22)
+_TARGET = const(23)
+_HEIGHT = const(24)
+_SETPOINT = const(28)
 _TELEMETRY = const(7)
 _TELEMETRY_FIELDS = const(28)
 _TELEMETRY_TICKS = const(0)
@@ -32,14 +40,14 @@ _FIELDS_STRIDE = const(1)
 # [end of constants]
 
 _COLUMNS = (  # where each field stands in a bubble's row, and by how many bits it is shifted
-    (layout.HEIGHT, 4),
-    (layout.PRESSURE, 2),
-    (layout.TARGET, 0),
-    (layout.STATUS, 0),
-    (layout.FAULTS, 0),
-    (layout.SETPOINT, 4),
-    (layout.FILL_US, 0),
-    (layout.VENT_US, 0),
+    (_HEIGHT, 4),
+    (_PRESSURE, 2),
+    (_TARGET, 0),
+    (_STATUS, 0),
+    (_FAULTS, 0),
+    (_SETPOINT, 4),
+    (_FILL_US, 0),
+    (_VENT_US, 0),
 )
 _SHIFTS = const(8)  # where in the plan the shifts begin
 

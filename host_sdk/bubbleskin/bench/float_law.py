@@ -1,216 +1,283 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The law of `bubble_firmware.control.step.step` once more, in ordinary floats: what `bubbleskin bench` holds it against.
+"""The law of `bubble_firmware.control` once more, in ordinary floats: what `bubbleskin bench` holds it against.
 
-It runs on CPython and, sent to the prompt of an emulated chip, as MicroPython's bytecode. The same readings give
-the same decisions but for rounding. Only what a healthy bubble goes through is here: no faults, no guards but the
-two comparisons of each reading. Units are those of `control`, without its scales: µm, Pa, µJ, µs, µJ/ms.
+It runs on CPython and, sent to the prompt of an emulated chip, as MicroPython's bytecode. The same three passes, by the same
+names, come to the same decisions but for rounding. Only what a healthy bubble goes through is here: of the limits only the two
+comparisons of each reading, no faults, no STOP. Units are those of `control`, without its scales: µm, Pa, µJ, µs, µJ/ms.
 """
 
-SUMMED = 3
-ATMOSPHERE = 101325.0
+from bubble_firmware.control.state_layout import (
+    ATMOSPHERE,
+    DECIMATION,
+    DOSE_MAX,
+    FOLLOW,
+    INNOVATION_PA,
+    INNOVATION_UM,
+    INTEGRAL_MAX,
+    KEEP_CLOSED,
+    SAMPLES_DOSED,
+    SAMPLES_MAX,
+)
 
 
 class Curve:
-    """Knots of (height, air, pressure), and the segment in which to look first."""
+    """Knots of (height, air, pressure)."""
 
     def __init__(self, knots):
         self.height = [float(knot[0]) for knot in knots]
         self.air = [float(knot[1]) for knot in knots]
         self.pressure = [float(knot[2]) for knot in knots]
-        self.lowest = min(self.pressure)
-        self.highest = max(self.pressure)
+        self.lowest_pressure = min(self.pressure)
+        self.highest_pressure = max(self.pressure)
         self.last = len(knots) - 2
 
-    def within(self, values, value, seg):
-        """The segment that holds `value` of rising `values`, and how far along it that is, 0 to 1."""
-        while seg > 0 and value < values[seg]:
-            seg -= 1
-        while seg < self.last and value > values[seg + 1]:
-            seg += 1
-        share = (value - values[seg]) / (values[seg + 1] - values[seg])
-        return seg, min(max(share, 0.0), 1.0)
+    def locate(self, values, value, segment):
+        """The segment that holds `value` of the rising `values`, looked for from `segment` on, and the share of it below."""
+        while segment > 0 and value < values[segment]:
+            segment -= 1
+        while segment < self.last and value > values[segment + 1]:
+            segment += 1
+        share = (value - values[segment]) / (values[segment + 1] - values[segment])
+        return segment, min(max(share, 0.0), 1.0)
 
-    def air_at(self, pressure, seg):
-        """The air at `pressure`, on the branch nearest to segment `seg`."""
-        low = high = seg
-        p = self.pressure
-        if pressure < self.lowest:
+    def between(self, values, segment, share):
+        """What `values` are at that share of a segment."""
+        return values[segment] + share * (values[segment + 1] - values[segment])
+
+    def slope(self, segment):
+        """Air per height, µJ/µm."""
+        return (self.air[segment + 1] - self.air[segment]) / (self.height[segment + 1] - self.height[segment])
+
+    def air_at(self, pressure, segment):
+        """The air that `pressure` means, in the segment that contains it and is nearest to `segment`."""
+        if pressure < self.lowest_pressure:
             return self.air[0]
-        if pressure > self.highest:
+        if pressure > self.highest_pressure:
             return self.air[-1]
-        turn = False
-        while (pressure - p[seg]) * (p[seg + 1] - pressure) < 0:
-            if turn:
-                if low > 0:
-                    low -= 1
-                seg = low
+        pressures = self.pressure
+        low = high = segment
+        upwards = True
+        while (pressure - pressures[segment]) * (pressures[segment + 1] - pressure) < 0:
+            if upwards:
+                high = min(high + 1, self.last)
+                segment = high
             else:
-                if high < self.last:
-                    high += 1
-                seg = high
-            turn = not turn
-        rise = p[seg + 1] - p[seg]
-        part = (pressure - p[seg]) / rise if rise else 0.0
-        return self.air[seg] + part * (self.air[seg + 1] - self.air[seg])
+                low = max(low - 1, 0)
+                segment = low
+            upwards = not upwards
+        rise = pressures[segment + 1] - pressures[segment]
+        return self.between(self.air, segment, (pressure - pressures[segment]) / rise if rise else 0.0)
 
 
 class Bubble:
-    """One bubble's state; `step` is its tick."""
+    """One bubble's state, named as in `state_layout`; `estimate`, `move_setpoint` and `dose` are its share of the passes."""
 
     def __init__(self, board, curve):
         self.board = board
         self.curve = curve
-        self.gain = board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO)) / 65536
+        self.flow_gain = board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO)) / 65536
+        self.pressure = 0.0
+        self.due = True
+        self.quiescent = self.hold_output = False
+        self.decimation_left = -1
+        self.decimation_sum = 0.0
+        self.settling_us = 0.0
         self.air = curve.air[0]
-        self.dose = self.next = self.flow = self.integral = self.error = self.aim = 0.0
-        self.busy = self.total = 0.0
-        self.wait = -1
-        self.calm = self.coast = False
-        self.ramping = True
-        self.trust = 0
+        self.air_in_flight = self.air_queued = 0.0
+        self.samples = 0
         self.resting = True
-        self.fill = self.vent = 0.0
-        self.seg = self.goal_seg = 0
-        self.height = self.start = self.target = float(board.HEIGHT_REST_UM)
-        self.setpoint = self.start
-        self.model = 0.0
-        self.goal = curve.air[0]
-        self.slope = (curve.air[1] - curve.air[0]) / (curve.height[1] - curve.height[0])
-        self.goal_slope = self.slope
+        self.flow = self.integral = self.error = self.previous_setpoint_air = 0.0
+        self.fill_us = self.vent_us = 0.0
+        self.height = self.ramp_start = self.target = self.setpoint = float(board.HEIGHT_REST_UM)
+        self.height_segment = self.setpoint_segment = 0
+        self.height_slope = self.setpoint_slope = curve.slope(0)
+        self.setpoint_air = curve.air[0]
+        self.ramping = True
 
-    def step(self, count, supply, active, same, share):
-        """Decide what the valves do in the next period."""
+    def set_target(self, height):
+        """Begin the way from where it is to `height`."""
+        self.ramp_start = self.height
+        self.target = float(height)
+        self.quiescent = self.hold_output = False
+        self.ramping = True
+
+    def estimate(self, count, same_mode):
+        """Take up a reading: pressure, and where the bubble is due air and height."""
         board = self.board
-        curve = self.curve
-        tick = board.TICK_US
-        p = float((count - board.SENSOR_ZERO) * board.SENSOR_PA_PER_COUNT)
-        if count <= board.COUNT_LOW or count >= board.COUNT_HIGH or p > board.PRESSURE_MAX_PA:
+        self.pressure = pressure = float((count - board.SENSOR_ZERO) * board.SENSOR_PA_PER_COUNT)
+        if count <= board.COUNT_LOW or count >= board.COUNT_HIGH or pressure > board.PRESSURE_MAX_PA:
             raise ValueError("a fault, which this law does not know")
-        if self.calm and same:
-            if self.busy > 0:
-                self.busy -= tick
-                return
-            if self.wait > 0:
-                self.wait -= 1
-                self.total += p
-                return
-        elif self.coast and same:
-            self.coast = False
-            self.air += self.dose
-            self.dose = self.next
-            return
-        air = self.air + self.dose
-        if self.busy <= 0:
-            mean = p
-            weight = 1
-            if self.wait == 0:
-                mean = (self.total + p) / 4
-                weight = 4
-            self.wait = -1
-            off = curve.air_at(mean, self.seg) - air
-            if self.resting:
-                air += off
-            else:
-                self.trust = min(self.trust + weight, 64)
-                seg = self.seg
-                part = (air - curve.air[seg]) / (curve.air[seg + 1] - curve.air[seg])
-                self.model = curve.pressure[seg] + min(max(part, 0.0), 1.0) * (
-                    curve.pressure[seg + 1] - curve.pressure[seg]
-                )
-                if abs(off) > 500 * self.slope and abs(mean - self.model) > 500:
-                    self.trust = weight = 1
-                air += off * weight / self.trust
-            air = max(air, 0.0)
-        self.air = air
-        self.seg, part = curve.within(curve.air, air, self.seg)
-        seg = self.seg
-        self.height = curve.height[seg] + part * (curve.height[seg + 1] - curve.height[seg])
-        self.slope = (curve.air[seg + 1] - curve.air[seg]) / (curve.height[seg + 1] - curve.height[seg])
-        if self.ramping:
-            self.ramping = share < 1
-            self.setpoint = self.start + (self.target - self.start) * share
-            self.goal_seg, part = curve.within(curve.height, self.setpoint, self.goal_seg)
-            seg = self.goal_seg
-            self.goal = curve.air[seg] + part * (curve.air[seg + 1] - curve.air[seg])
-            self.goal_slope = (curve.air[seg + 1] - curve.air[seg]) / (curve.height[seg + 1] - curve.height[seg])
+        self.due = self._is_due(same_mode)
+        if self.due:
+            self.air += self.air_in_flight
+            if self.settling_us <= 0:
+                self._correct()
+            curve = self.curve
+            self.height_segment, share = curve.locate(curve.air, self.air, self.height_segment)
+            self.height = curve.between(curve.height, self.height_segment, share)
+            self.height_slope = curve.slope(self.height_segment)
 
-        filled = self.fill
-        vented = self.vent
-        energised = filled + vented
-        self.dose = self.next
-        tail = 0.0
-        if energised:
-            self.busy = energised + board.VALVE_CLOSES_US + board.QUIET_US - tick
-            if energised == tick:
-                tail = self.flow * board.VALVE_CLOSES_US / 1000
-                if vented:
-                    tail = -tail
-        elif self.busy > 0:
-            self.busy -= tick
-        self.fill = self.vent = 0.0
-        if not active or self.setpoint <= board.HEIGHT_REST_UM + board.DEADBAND_UM:
-            self.calm = vented == tick and not self.ramping
-            self.next = self.busy = self.error = self.integral = self.flow = 0.0
-            self.aim = air
-            self.trust = 0
-            self.vent = float(tick)
-            self.resting = True
+    def _is_due(self, same_mode):
+        if self.quiescent and same_mode:
+            if self.settling_us > 0:
+                self.settling_us -= self.board.TICK_US
+                return False
+            if self.decimation_left > 0:
+                self.decimation_left -= 1
+                self.decimation_sum += self.pressure
+                return False
+        elif self.hold_output and same_mode:
+            self.hold_output = False
+            self.air += self.air_in_flight
+            self.air_in_flight = self.air_queued
+            return False
+        return True
+
+    def _correct(self):
+        """Move the air towards what the pressure means."""
+        mean = self.pressure
+        weight = 1
+        if self.decimation_left == 0:
+            weight = DECIMATION + 1
+            mean = (self.decimation_sum + mean) / weight
+        self.decimation_left = -1
+        innovation = self.curve.air_at(mean, self.height_segment) - self.air
+        if self.resting:  # the vent is open: the sensor alone says what there is
+            self.air += innovation
         else:
-            self.resting = False
-            ahead = self.goal - self.aim
-            error = self.aim - air - self.dose - tail
-            self.aim = self.goal
-            self.next = tail
-            self.calm = False
-            if not ahead and abs(error) <= self.goal_slope * board.DEADBAND_UM:
-                self.calm = not (energised or self.dose or self.ramping)
-            elif self.trust:
-                self._dose(p, supply, ahead, error, tail, filled, vented)
-            self.error = error
-        if self.calm and self.busy <= 0:
-            self.wait = SUMMED
-            self.total = 0.0
+            self.samples = min(self.samples + weight, SAMPLES_MAX)
+            if self._contradicts(mean, innovation):
+                self.samples = weight = 1
+            self.air += innovation * weight / self.samples
+        self.air = max(self.air, 0.0)
 
-    def _dose(self, p, supply, ahead, error, tail, filled, vented):
+    def _contradicts(self, mean, innovation):
+        """The innovation gate: whether a measurement is too far from the estimate to be averaged with it."""
+        curve = self.curve
+        segment = self.height_segment
+        share = (self.air - curve.air[segment]) / (curve.air[segment + 1] - curve.air[segment])
+        expected = curve.between(curve.pressure, segment, min(max(share, 0.0), 1.0))
+        return abs(innovation) > INNOVATION_UM * self.height_slope and abs(mean - expected) > INNOVATION_PA
+
+    def move_setpoint(self, share):
+        """Find height and air of the setpoint, where it moves: `share` of the ramp is done."""
+        if self.due and self.ramping:
+            curve = self.curve
+            self.ramping = share < 1
+            self.setpoint = self.ramp_start + (self.target - self.ramp_start) * share
+            self.setpoint_segment, part = curve.locate(curve.height, self.setpoint, self.setpoint_segment)
+            self.setpoint_slope = curve.slope(self.setpoint_segment)
+            self.setpoint_air = curve.between(curve.air, self.setpoint_segment, part)
+
+    def dose(self, supply, mode):
+        """Decide what the valves do in the next period."""
+        if not self.due:
+            return
+        board = self.board
+        filled, vented = self.fill_us, self.vent_us
+        tail = self._begin_period()
+        self.fill_us = self.vent_us = 0.0
+        if mode != FOLLOW or self.setpoint <= board.HEIGHT_REST_UM + board.DEADBAND_UM:
+            self._vent(vented)
+        else:
+            self._follow(supply, tail, filled, vented)
+        if self.quiescent and self.settling_us <= 0:
+            self.decimation_left = DECIMATION
+            self.decimation_sum = 0.0
+
+    def _begin_period(self):
+        """What the period that has just begun does. Returns the air that its valve, closing, brings into the next."""
         board = self.board
         tick = board.TICK_US
-        integral = self.integral + error
-        change = error - self.error
-        want = ahead + (error * board.GAIN_P + integral * board.GAIN_I + change * board.GAIN_D) / 256
-        lost = board.TUBE_PA_PER_FLOW * self.flow if self.busy <= 0 else 0.0
-        if want > 0:
-            opened = filled == tick
-            p1 = supply + ATMOSPHERE
-            p2 = min(p + lost + ATMOSPHERE, p1)
-        else:
-            opened = vented == tick
-            p1 = max(p - lost, 0.0) + ATMOSPHERE
-            p2 = ATMOSPHERE
-        flow = ((p1 - p2) * (p2 + (1 - board.CRITICAL_RATIO / 128) * p1)) ** 0.5 / 8 * self.gain + 0.0625
-        self.flow = flow
-        shortest = board.PULSE_MIN_US
+        energised = self.fill_us + self.vent_us
+        self.air_in_flight = self.air_queued
+        if energised:
+            self.settling_us = energised + board.VALVE_CLOSES_US + board.QUIET_US - tick
+        elif self.settling_us > 0:
+            self.settling_us -= tick
+        if energised != tick:
+            return 0.0
+        tail = self.flow * board.VALVE_CLOSES_US / 1000
+        return -tail if self.vent_us else tail
+
+    def _vent(self, vented):
+        tick = self.board.TICK_US
+        self.resting = True
+        self.quiescent = vented == tick and not self.ramping
+        self.air_queued = self.settling_us = self.error = self.integral = self.flow = 0.0
+        self.previous_setpoint_air = self.air
+        self.samples = 0
+        self.vent_us = float(tick)
+
+    def _follow(self, supply, tail, filled, vented):
+        """The air that is missing, and what the setpoint's own motion asks for: feed-forward."""
+        board = self.board
+        self.resting = False
+        ahead = self.setpoint_air - self.previous_setpoint_air
+        error = self.previous_setpoint_air - self.air - self.air_in_flight - tail
+        self.previous_setpoint_air = self.setpoint_air
+        self.air_queued = tail
+        self.quiescent = False
+        if not ahead and abs(error) <= self.setpoint_slope * board.DEADBAND_UM:
+            self.quiescent = not (filled or vented or self.air_in_flight or self.ramping)
+        elif self.samples:
+            integral = self.integral + error
+            change = error - self.error
+            want = ahead + (error * board.GAIN_P + integral * board.GAIN_I + change * board.GAIN_D) / 256
+            opened = (filled if want > 0 else vented) == board.TICK_US
+            width = self._pulse(want, supply, opened, tail)
+            if width < board.TICK_US:  # only while not saturated: the integral must not wind up
+                self.integral = min(max(integral, -INTEGRAL_MAX), INTEGRAL_MAX)
+        self.error = error
+
+    def _pulse(self, want, supply, opened, tail):
+        """Have the air `want` come in the next period, or go where it is negative; returns how long a valve is energised."""
+        board = self.board
+        tick = board.TICK_US
+        self.flow = flow = self._flow(want, supply)
         delay = 0.0 if opened else board.VALVE_OPENS_US - board.VALVE_CLOSES_US
-        width = min(abs(want), 50000.0) * 1000 / flow + delay
-        self.coast = opened and width > 3 * tick
+        width = min(abs(want), DOSE_MAX) * 1000 / flow + delay
+        self.hold_output = opened and width > 3 * tick
+        width = self._playable(width, delay, opened)
+        if not width:
+            return width
+        moved = width - delay
+        if width == tick:
+            moved -= board.VALVE_CLOSES_US
+            self.samples = 1
+        else:
+            self.samples = min(self.samples, SAMPLES_DOSED)
+        moved = flow * moved / 1000
+        if want > 0:
+            self.fill_us = width
+            self.air_queued = tail + moved
+        else:
+            self.vent_us = width
+            self.air_queued = tail - moved
+        return width
+
+    def _flow(self, want, supply):
+        """Flow of a restrictor below its critical ratio (ISO 6358), filling where `want` is positive, else venting."""
+        board = self.board
+        lost = board.TUBE_PA_PER_FLOW * self.flow if self.settling_us <= 0 else 0.0
+        if want > 0:
+            p1 = supply + ATMOSPHERE
+            p2 = min(self.pressure + lost + ATMOSPHERE, p1)
+        else:
+            p1 = max(self.pressure - lost, 0.0) + ATMOSPHERE
+            p2 = ATMOSPHERE
+        root = ((p1 - p2) * (p2 + (1 - board.CRITICAL_RATIO / 128) * p1)) ** 0.5
+        return root / 8 * self.flow_gain + 0.0625
+
+    def _playable(self, width, delay, opened):
+        """The pulse nearest to `width` that a valve can play: neither it nor the gap after it too short."""
+        tick = self.board.TICK_US
+        shortest = self.board.PULSE_MIN_US
         if width > tick - shortest:
-            width = float(tick) if width > tick - shortest / 2 else float(tick - shortest)
-        elif width < shortest and not opened:
-            width = float(shortest) if 2 * (width - delay) >= shortest - delay else 0.0
-        if width < tick:
-            self.integral = min(max(integral, -131072.0), 131072.0)
-        if width:
-            moved = width - delay
-            if width == tick:
-                moved -= board.VALVE_CLOSES_US
-                self.trust = 1
-            else:
-                self.trust = min(self.trust, 16)
-            if want > 0:
-                self.fill = width
-                self.next = tail + flow * moved / 1000
-            else:
-                self.vent = width
-                self.next = tail - flow * moved / 1000
+            return float(tick) if width > tick - shortest / 2 else float(tick - shortest)
+        if width < shortest and not opened:
+            return float(shortest) if 2 * (width - delay) >= shortest - delay else 0.0
+        return width
 
 
 class Bubbles:
@@ -218,30 +285,33 @@ class Bubbles:
 
     def __init__(self, board, curves):
         self.bubbles = [Bubble(board, Curve(knots)) for knots in curves]
-        self.done = 0
-        self.ticks = 1
+        self.ramp_done = 0
+        self.ramp_ticks = 1
         self.mode = 0
 
     def set_targets(self, heights, ticks):
         """Ramp to `heights` within so many ticks."""
         for bubble, height in zip(self.bubbles, heights):  # noqa: B905 - MicroPython has no strict
-            bubble.start = bubble.height
-            bubble.target = float(height)
-            bubble.calm = bubble.coast = False
-            bubble.ramping = True
-        self.done = 0
-        self.ticks = ticks
+            bubble.set_target(height)
+        self.ramp_done = 0
+        self.ramp_ticks = ticks
 
     def step(self, counts, supply, mode):
         """One tick."""
-        if self.done != self.ticks:
-            self.done += 1
-        share = self.done / self.ticks
-        same = mode == self.mode
+        if mode == KEEP_CLOSED:
+            raise ValueError("STOP or a silent host, which this law does not know")
+        same_mode = mode == self.mode
         self.mode = mode
         for i, bubble in enumerate(self.bubbles):
-            bubble.step(counts[i], supply, mode == 1, same, share)
+            bubble.estimate(counts[i], same_mode)
+        if self.ramp_done != self.ramp_ticks:
+            self.ramp_done += 1
+        share = self.ramp_done / self.ramp_ticks
+        for bubble in self.bubbles:
+            bubble.move_setpoint(share)
+        for bubble in self.bubbles:
+            bubble.dose(supply, mode)
 
     def pulses(self):
         """Fill and vent µs of every bubble."""
-        return [width for bubble in self.bubbles for width in (bubble.fill, bubble.vent)]
+        return [width for bubble in self.bubbles for width in (bubble.fill_us, bubble.vent_us)]

@@ -36,7 +36,6 @@ _PHASES = (
 _EDGES = (layout.FIRST_SEGMENT, layout.LAST_SEGMENT)
 _CHUNK = 20  # ticks sent to the prompt at once
 _SAME_US = 20  # so near, two pulses count as one
-_SAME_UM = 50
 
 _HARNESS = """
 from array import array
@@ -96,15 +95,19 @@ class Replayed(NamedTuple):
     pulses: NDArray[np.int64]
 
 
-def rows() -> Iterator[Row]:
-    """Control work against the same law in float bytecode; then whole ticks of both boards."""
-    yield from _control_rows(boards.DEFAULT)
+def rows(size: float = 1.0) -> Iterator[Row]:
+    """Control work against the same law in float bytecode; then whole ticks of both boards. Less `size`, shorter runs."""
+    yield from control_rows(boards.DEFAULT, size)
     for board in boards.NAMES:
-        yield from tick_rows(board)
+        yield from tick_rows(board, 5.0 * size)
 
 
-def _control_rows(board: str) -> Iterator[Row]:
-    ticks = record(board, _PHASES)
+def control_rows(board: str, size: float = 1.0) -> Iterator[Row]:
+    """Control work by phase, at fixed point and in floats.
+
+    A `BubbleskinError` where the chip decides otherwise than the simulator, or the law in floats otherwise than both.
+    """
+    ticks = record(board, [(name, size * seconds, every, ramp) for name, seconds, every, ramp in _PHASES])
     bare = firmware([BARE])[BARE]
     fixed = replay(board, ticks, bare, _FIXED)
     if fixed.pulses.tolist() != [tick.pulses for tick in ticks]:
@@ -177,6 +180,8 @@ class Load(NamedTuple):
     """What a board does under load. Times are upper edges of bins, see TICKS on the wire."""
 
     ticks: int
+    elapsed_us: float
+    """Emulated time in which they were counted."""
     mean_us: float
     worst_us: float
     late: int
@@ -195,8 +200,8 @@ def load(name: str, seconds: float) -> Load:
     skin.sleep(0.2)
     skin.health()  # whatever is made on first use is there now
     before, histogram = skin.health(), skin.tick_histogram()
-    end = board.time + seconds
-    due = board.time
+    begun = due = board.time
+    end = begun + seconds
     states = 0
     for _ in skin.telemetry(50):
         states += 1
@@ -206,11 +211,13 @@ def load(name: str, seconds: float) -> Load:
         if board.time >= end:
             break
     worked = skin.tick_histogram().worked - histogram.worked
+    elapsed_us = 1e6 * (board.time - begun)
     skin.vent()
     after = skin.health()
     edges = (1 + np.arange(len(worked))) * histogram.work_bin * 1e6
     return Load(
         int(worked.sum()),
+        elapsed_us,
         float(worked @ edges / worked.sum()),
         float(edges[np.nonzero(worked)[0][-1]]),
         after.late_ticks - before.late_ticks,
