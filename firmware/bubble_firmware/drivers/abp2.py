@@ -10,6 +10,15 @@ the last time, so the tick, which must not be shorter than 5 ms, never waits. At
 A sensor that does not answer is ABSENT and asked again after a while, because asking costs memory.
 """
 
+from bubble_protocol.mpy_compat import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from array import array
+
+    from machine import I2C
+
+    from bubble_firmware.drivers.tca9548a import Tca9548a
+
 _ADDRESS = 0x28
 _START = b"\xaa\x00\x00"
 _POWERED = 0x40
@@ -25,7 +34,7 @@ class Abp2:
     A count is `pa_per_count`, `zero` stands for none.
     """
 
-    def __init__(self, bus, switch, sensors, range_pa, zero, pa_per_count):
+    def __init__(self, bus: "I2C", switch: "Tca9548a", sensors: int, range_pa: int, zero: int, pa_per_count: int):
         self.sensors = sensors
         self._bus = bus
         self._switch = switch
@@ -38,7 +47,7 @@ class Abp2:
         self._switch_rest = 0
         self._started = False
 
-    def read(self, counts, at):
+    def read(self, counts: "array[int]", at: int) -> int:
         """Fill in `counts[at:]`, one per sensor, and start the next measurement; returns how many have answered."""
         answers = 0
         for channel in range(self.sensors):
@@ -55,7 +64,7 @@ class Abp2:
                 self._switch_rest = _AGAIN
         return answers
 
-    def _read(self, channel):
+    def _read(self, channel: int) -> int:
         if not self._started:
             return ABSENT
         if self._rest[channel]:
@@ -74,7 +83,7 @@ class Abp2:
         count = self._zero + (((reply[1] << 8 | reply[2]) - _TENTH) * self._gain + 32768 >> 16)
         return 0 if count < 0 else 4095 if count > 4095 else count
 
-    def _select(self, mask):
+    def _select(self, mask: int) -> bool:
         if self._switch_rest:
             self._switch_rest -= 1
             return False
