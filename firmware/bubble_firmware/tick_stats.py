@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """How long ticks take and how late they begin."""
 
 from array import array
@@ -12,7 +12,7 @@ BINS = const(24)
 
 
 @micropython.viper
-def _count(counts: ptr32, us: int, width: int):
+def _count(counts: ptr32, us: int, width: int):  # type: ignore[no-untyped-def]
     """Count one time in bins of `width` µs; the last bin also takes everything longer."""
     index = us // width
     if index > BINS - 1:

@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def,no-redef"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-redef"
 """Numbers in bytes, little-endian, and bytes from here to there: without the tuples of `struct` and the slices that allocate."""
 
 from bubble_protocol.mpy_compat import COMPILED, TYPE_CHECKING, micropython, ptr8
@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
 
 @micropython.viper
-def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):
+def copy(source: ptr8, start: int, end: int, target: ptr8, at: int):  # type: ignore[no-untyped-def]
     """`target[at:] = source[start:end]`, without slices."""
     while start < end:
         target[at] = source[start]

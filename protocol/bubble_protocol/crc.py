@@ -1,4 +1,4 @@
-# mypy: disable-error-code="no-untyped-def,no-redef"
+# mypy: disable-error-code="no-redef"
 """CRC-32 (IEEE 802.3, as in zlib) written straight into a buffer.
 
 MicroPython's `binascii.crc32` returns a long integer for three values in four, and a long integer is an
@@ -37,7 +37,7 @@ TABLE = _table()
 
 
 @micropython.viper
-def _crc32_into(table, buffer, start: int, end: int, out, at: int):
+def _crc32_into(table, buffer, start: int, end: int, out, at: int):  # type: ignore[no-untyped-def]
     words = ptr32(table)
     data = ptr8(buffer)
     crc = -1
@@ -59,7 +59,7 @@ def crc32_into(buffer: "Buffer", start: int, end: int, out: bytearray, at: int) 
 
 
 @micropython.viper
-def _crc32_on(table, buffer, start: int, end: int, word):
+def _crc32_on(table, buffer, start: int, end: int, word):  # type: ignore[no-untyped-def]
     words = ptr32(table)
     data = ptr8(buffer)
     state = ptr32(word)

@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def,no-redef"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-redef"
 """Frames on the wire: COBS around (id, sequence number, payload, CRC-32), one 0x00 after each.
 
     | 1      | 1  | 2        | 0..247  | 4      | 1    |
@@ -43,7 +43,7 @@ _SHORTEST = 1 + HEADER + CRC  # without the delimiter
 
 
 @micropython.viper
-def _apply_key(frame: ptr8, end: int, key: ptr8):
+def _apply_key(frame: ptr8, end: int, key: ptr8):  # type: ignore[no-untyped-def]
     """XOR the key into the CRC before `end`, unless the frame is about HELLO; put a zero at `end`."""
     message_id = frame[1]
     if not (message_id == _HELLO or message_id == (_HELLO | _REPLY) or (message_id == _ERROR and frame[4] == _HELLO)):
@@ -55,7 +55,7 @@ def _apply_key(frame: ptr8, end: int, key: ptr8):
 
 
 @micropython.viper
-def _cobs_encode(frame: ptr8, end: int):
+def _cobs_encode(frame: ptr8, end: int):  # type: ignore[no-untyped-def]
     """Put the distance to the next zero in place of every zero of `frame[0:end]`; one stands at `end`."""
     at = 0
     i = 1

@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """Steps of a sequence on the wire and in the device's memory: records of 16-bit words, and what makes one sound.
 
 | word | of a step | of a repeat |
@@ -141,7 +141,7 @@ def first_invalid(v: ptr32, c: ptr32, at: int, records: int) -> int:
 
 
 @micropython.viper
-def _accept(v: ptr32, c: ptr32, t: ptr32, at: int, end: int):
+def _accept(v: ptr32, c: ptr32, t: ptr32, at: int, end: int):  # type: ignore[no-untyped-def]
     crc = c[CRC]
     while at < end:
         crc = (crc >> 8 & 0xFFFFFF) ^ t[(crc ^ v[at]) & 255]
@@ -178,7 +178,7 @@ def same_word(a: ptr32, at: int, b: ptr32, bt: int) -> int:
 
 
 @micropython.viper
-def copy_word(a: ptr32, at: int, b: ptr32, bt: int):
+def copy_word(a: ptr32, at: int, b: ptr32, bt: int):  # type: ignore[no-untyped-def]
     """Copy one word, whatever its size."""
     b[bt] = a[at]
 

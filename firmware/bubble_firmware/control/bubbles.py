@@ -11,7 +11,14 @@ from bubble_firmware.control import curve, flow, trajectory
 from bubble_firmware.control.dose import dose
 from bubble_firmware.control.estimate import estimate
 from bubble_firmware.control.table import KNOTS_MAX
-from bubble_protocol.mpy_compat import const, micropython, ptr32, uint
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr32, uint
+
+if TYPE_CHECKING:
+    from types import ModuleType
+    from typing import Any
+
+    from bubble_firmware.control.table import Tables
+    from bubble_protocol.mpy_compat import Words
 
 # [constants] bubble_firmware.control.state_layout: used
 _SENSOR_ZERO = const(0)
@@ -66,7 +73,7 @@ _WHOLE_WAY = const(32768)  # in the shares of `advance`
 
 
 @micropython.viper
-def _pack_state(row: ptr32, values: ptr32, at: int, n: int):
+def _pack_state(row: ptr32, values: ptr32, at: int, n: int):  # type: ignore[no-untyped-def]
     """Copy what STATE and TELEMETRY say of every bubble to `values[at:]`, in the schema's order."""
     while n > 0:
         values[at] = row[_HEIGHT] >> 4
@@ -80,7 +87,7 @@ def _pack_state(row: ptr32, values: ptr32, at: int, n: int):
 
 
 @micropython.viper
-def _pack_fields(row: ptr32, values: ptr32, plan: ptr32, at: int, columns: int, n: int):
+def _pack_fields(row: ptr32, values: ptr32, plan: ptr32, at: int, columns: int, n: int):  # type: ignore[no-untyped-def]
     """Copy the words of every row that `plan` names, shifted right by what stands 8 words after each name."""
     while n > 0:
         i = 0
@@ -99,7 +106,7 @@ class Bubbles:
     `state` is everything, `rows` and `curves` are its parts, for whoever knows `state_layout`.
     """
 
-    def __init__(self, board, tables):
+    def __init__(self, board: "ModuleType", tables: "Tables"):
         n = board.BUBBLES
         self.count = n
         self.pulses = array("H", bytearray(4 * n))
@@ -123,14 +130,20 @@ class Bubbles:
         # A default is a local: an attribute costs the chip 2.5 µs. More than 11 locals and values, and a call allocates.
         work = (self.state, estimate, trajectory.move_setpoints, dose, self.pulses)
 
-        def step(counts, supply_pa, control_mode, rows=self.rows, work=work):
+        def step(
+            counts: "array[int]",
+            supply_pa: int,
+            control_mode: int,
+            rows: memoryview = self.rows,
+            work: "tuple[Any, ...]" = work,
+        ) -> None:
             work[1](rows, work[0], counts, control_mode)
             work[2](rows, work[0])
             work[3](rows, work[0], work[4], supply_pa, control_mode)
 
         self.step = step
 
-    def _take_up_board(self, board):
+    def _take_up_board(self, board: "ModuleType") -> None:
         state = self.state
         state[_BUBBLE_COUNT] = self.count
         state[_TICK_US] = board.TICK_US
@@ -162,7 +175,7 @@ class Bubbles:
             rows[at + _HEIGHT] = rows[at + _SETPOINT] = board.HEIGHT_REST_UM << 4
             rows[at + _DECIMATION_LEFT] = -1
 
-    def use_tables(self):
+    def use_tables(self) -> None:
         """Take up the tables in use, after a commit. The air stays; what height it means is found anew."""
         rows = self.rows
         stride = _KNOT_WORDS * curve.KNOTS_MAX
@@ -179,66 +192,66 @@ class Bubbles:
             rows[at + _QUIESCENT] = rows[at + _HOLD_OUTPUT] = 0
             rows[at + _RAMPING] = 1  # the setpoint's air is to be found again
 
-    def set_targets(self, heights, at, ticks):
+    def set_targets(self, heights: "Words", at: int, ticks: int) -> None:
         """Ramp every bubble from where it is to the height (µm) in `heights[at:]` within `ticks` ticks."""
         trajectory.set_targets(self.rows, heights, at, self.count)
         self._ramp(ticks)
 
-    def begin_step(self, words, at, from_height):
+    def begin_step(self, words: bytearray, at: int, from_height: int) -> None:
         """Begin a step of a sequence, whose targets (µm) are `words[at:]`; `advance` moves it on."""
         trajectory.set_next_targets(self.rows, words, at, self.count, from_height, self.state[_REST_UM])
         self._ramp(_WHOLE_WAY)
 
-    def advance(self, share):
+    def advance(self, share: int) -> None:
         """Let the setpoints be `share`/32768 of their way at the end of this period. `step` adds the last one."""
         self.state[_RAMP_DONE] = share - 1
 
-    def unsettled(self, tolerance):
+    def unsettled(self, tolerance: int) -> int:
         """The bubbles, as bits, that are further than `tolerance` µm from their targets."""
         return trajectory.unsettled(self.rows, self.count, tolerance, self.state[_REST_UM])
 
-    def hold_position(self):
+    def hold_position(self) -> None:
         """Where the bubbles are is where they are wanted."""
         trajectory.hold_position(self.rows, self.count)
         self._ramp(1)
 
-    def retract(self):
+    def retract(self) -> None:
         """No bubble is wanted higher than it is without pressure."""
         trajectory.retract(self.rows, self.state[_REST_UM], self.count)
         self._ramp(1)
 
-    def _ramp(self, ticks):
+    def _ramp(self, ticks: int) -> None:
         self.state[_RAMP_DONE] = 0
         self.state[_RAMP_TICKS] = ticks
 
-    def clear_faults(self, bubble):
+    def clear_faults(self, bubble: int) -> None:
         """Forget the faults of one bubble; what still is wrong faults again.
 
         What leads to a fault goes on counting: a host that clears all the time does not disarm the limits.
         """
         self.rows[bubble * _ROW_WORDS + _FAULTS] = 0
 
-    def trim(self, bubble, number):
+    def trim(self, bubble: int, number: int) -> int:
         """One of the trim values of a bubble, see `trim`."""
         return self.rows[bubble * _ROW_WORDS + number]
 
-    def set_trim(self, bubble, number, value):
+    def set_trim(self, bubble: int, number: int, value: int) -> None:
         """Take up one of the trim values of a bubble."""
         self.rows[bubble * _ROW_WORDS + number] = value
 
-    def pressure_pa(self, bubble):
+    def pressure_pa(self, bubble: int) -> int:
         """Gauge pressure of one bubble."""
         return self.rows[bubble * _ROW_WORDS + _PRESSURE]
 
-    def faults(self, bubble):
+    def faults(self, bubble: int) -> int:
         """Fault bits of one bubble."""
         return self.rows[bubble * _ROW_WORDS + _FAULTS]
 
-    def pack_state(self, values, at):
+    def pack_state(self, values: "Words", at: int) -> None:
         """Put the repeated fields of STATE at `values[at:]`."""
         _pack_state(self.rows, values, at, self.count)
 
-    def pack_fields(self, values, plan, at, columns):
+    def pack_fields(self, values: "Words", plan: "Words", at: int, columns: int) -> int:
         """Put chosen words of every bubble's row at `values[at:]`; returns how many.
 
         `plan` names `columns` words of a row, and from its ninth place on by how many bits each is shifted right.

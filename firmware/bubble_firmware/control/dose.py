@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """Third pass over all bubbles: what each is to do, and the open times of its valves.
 
 An integer PID on the air that is missing, fed forward by the air that the moving setpoint itself needs. Air becomes open

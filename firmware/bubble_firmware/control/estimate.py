@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """First pass over all bubbles: limits of the sensors, and the air and height of each.
 
 The controlled quantity is *air*. The valves' air is counted, and the count is corrected by the pressure sensor whenever no

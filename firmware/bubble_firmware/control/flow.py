@@ -8,7 +8,10 @@ for venting, p₂ being the atmosphere, over p₁ − p₂ in steps of 1024 Pa, 
 
 from array import array
 
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 # [constants] bubble_firmware.control.state_layout: used
 _ROOT_STEPS = const(64)
@@ -16,13 +19,13 @@ _ATMOSPHERE = const(101325)
 # [end of constants]
 
 
-def flow_gain(board):
+def flow_gain(board: "ModuleType") -> int:
     """Flow gain of the board's restrictors: root of pressures (8 Pa) to flow (µJ/ms), *65536."""
     # C (1e-6 dm³/(s bar)) 1e-14 SI, times 1e5 Pa (ANR) 8 Pa/(1 - b), W to µJ/ms, *65536
     return board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO))
 
 
-def roots(critical: int):
+def roots(critical: int) -> "array[int]":
     """The tables of roots for the critical ratio `critical`/256."""
     table = array("i", bytearray(4 * 2 * (_ROOT_STEPS + 1)))
     choke = 256 - critical  # from this share of pressure on, *256, flow does not grow

@@ -3,7 +3,10 @@
 
 from array import array
 
-from bubble_protocol.mpy_compat import const, micropython, ptr32
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr32
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 _PATIENCE_US = 5000000  # at boot: an empty reservoir is full in two seconds
 _DIP_US = 2000000  # later: nineteen bubbles that rise at once take it below what is needed for 0.8 s
@@ -57,7 +60,7 @@ def _sense(s: ptr32, count: int) -> int:
 class Supply:
     """`pressure_pa` is measured, `pump` (0 to 65535) and `dump` are what to do about it; `lost`: it does not help."""
 
-    def __init__(self, board):
+    def __init__(self, board: "ModuleType"):
         self.pressure_pa = 0
         self.pump = 0
         self.dump = 0
@@ -77,7 +80,7 @@ class Supply:
         ):
             self._state.append(number)
 
-    def sense(self, count):
+    def sense(self, count: int) -> None:
         """Take one reading of the supply sensor. A sensor at the end of its range stops the pump."""
         state = self._state
         self.lost = _sense(state, count) > (self._dip if state[_FULL] else self._patience)
@@ -85,7 +88,7 @@ class Supply:
         self.pump = state[_PUMP]
         self.dump = state[_DUMP]
 
-    def clear(self):
+    def clear(self) -> None:
         """Wait as after boot before the supply is called lost."""
         self._state[_LOW] = 0
         self._state[_FULL] = 0

@@ -16,7 +16,7 @@ HEIGHT_MAX_UM = 16000  # beyond, the air of a bubble no longer fits the arithmet
 class Tables:
     """All bubbles' tables: `knots` and `sizes` in use, and a second set that `write` fills and `commit` takes up."""
 
-    def __init__(self, bubbles):
+    def __init__(self, bubbles: int):
         self.bubbles = bubbles
         self.knots = bytearray(bubbles * KNOTS_MAX * KNOT_BYTES)
         self.sizes = array("i", bytearray(4 * bubbles))
@@ -26,7 +26,7 @@ class Tables:
         self._received_sizes = array("i", bytearray(4 * bubbles))
         self.use_nominal()
 
-    def use_nominal(self):
+    def use_nominal(self) -> None:
         """Use the table of the bubble as the paper measured it, for all."""
         for bubble in range(self.bubbles):
             self.write_size(bubble, len(NOMINAL))
@@ -35,11 +35,11 @@ class Tables:
                 self.write_knot(bubble, index, knot[0], knot[1])
         self.swap()
 
-    def write_size(self, bubble, size):
+    def write_size(self, bubble: int, size: int) -> None:
         """Announce how many knots a received table has."""
         self._received_sizes[bubble] = size
 
-    def write_knot(self, bubble, index, height_um, pressure_pa):
+    def write_knot(self, bubble: int, index: int, height_um: int, pressure_pa: int) -> None:
         """Take one knot of a received table."""
         at = (bubble * KNOTS_MAX + index) * KNOT_BYTES
         received = self._received
@@ -48,14 +48,14 @@ class Tables:
         received[at + 2] = pressure_pa & 255
         received[at + 3] = pressure_pa >> 8
 
-    def read_knot(self, bubble, index, values, at):
+    def read_knot(self, bubble: int, index: int, values: "array[int]", at: int) -> None:
         """Put height and pressure of one knot in use at `values[at:at + 2]`."""
         byte = (bubble * KNOTS_MAX + index) * KNOT_BYTES
         knots = self.knots
         values[at] = knots[byte] | knots[byte + 1] << 8
         values[at + 1] = knots[byte + 2] | knots[byte + 3] << 8
 
-    def pressures(self, bubble):
+    def pressures(self, bubble: int) -> "tuple[int, int]":
         """The least and the greatest pressure in a table in use, Pa."""
         start = bubble * KNOTS_MAX * KNOT_BYTES
         knots = self.knots
@@ -66,7 +66,7 @@ class Tables:
             most = max(most, pressure)
         return least, most
 
-    def first_flaw(self, height_max_um, pressure_max_pa):
+    def first_flaw(self, height_max_um: int, pressure_max_pa: int) -> int:
         """Where the received set cannot be used: bubble * KNOTS_MAX + knot, or -1 where all is well.
 
         Heights must rise, the last must reach `height_max_um`, pressures must stay within `pressure_max_pa`.
@@ -86,7 +86,7 @@ class Tables:
                 return bubble * KNOTS_MAX + size - 1
         return -1
 
-    def received_crc(self):
+    def received_crc(self) -> int:
         """CRC-32 of the received set, as a signed word: per bubble its knots as (u16 µm, u16 Pa)."""
         self._crc[0] = 0
         for bubble in range(self.bubbles):
@@ -94,7 +94,7 @@ class Tables:
             crc32_on(self._received, start, start + self._received_sizes[bubble] * KNOT_BYTES, self._crc)
         return self._crc[0]
 
-    def swap(self):
+    def swap(self) -> None:
         """Use the received set; what is received next starts from a copy of it."""
         self.crc = self.received_crc()
         self.knots[:] = self._received

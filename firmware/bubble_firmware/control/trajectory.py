@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """Second pass over all bubbles: the setpoints' way to the targets. And the targets themselves, as they are asked."""
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint

@@ -10,7 +10,14 @@ the last time, so the tick, which must not be shorter than 5 ms, never waits. At
 A sensor that does not answer is ABSENT and asked again after a while, because asking costs memory.
 """
 
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+
+if TYPE_CHECKING:
+    from array import array
+
+    from machine import I2C
+
+    from bubble_firmware.drivers.tca9548a import Tca9548a
 
 # [constants] bubble_firmware.hal.base: ABSENT
 _ABSENT = const(65535)
@@ -30,7 +37,7 @@ class Abp2:
     A count is `pa_per_count`, `zero` stands for none.
     """
 
-    def __init__(self, bus, switch, sensors, range_pa, zero, pa_per_count):
+    def __init__(self, bus: "I2C", switch: "Tca9548a", sensors: int, range_pa: int, zero: int, pa_per_count: int):
         self.sensors = sensors
         self._bus = bus
         self._switch = switch
@@ -43,7 +50,7 @@ class Abp2:
         self._switch_rest = 0
         self._started = False
 
-    def read(self, counts, at):
+    def read(self, counts: "array[int]", at: int) -> int:
         """Fill in `counts[at:]`, one per sensor, and start the next measurement; returns how many have answered."""
         answers = 0
         for channel in range(self.sensors):
@@ -60,7 +67,7 @@ class Abp2:
                 self._switch_rest = _AGAIN
         return answers
 
-    def _read(self, channel):
+    def _read(self, channel: int) -> int:
         if not self._started:
             return _ABSENT
         if self._rest[channel]:
@@ -79,7 +86,7 @@ class Abp2:
         count = self._zero + (((reply[1] << 8 | reply[2]) - _TENTH) * self._gain + 32768 >> 16)
         return 0 if count < 0 else 4095 if count > 4095 else count
 
-    def _select(self, mask):
+    def _select(self, mask: int) -> bool:
         if self._switch_rest:
             self._switch_rest -= 1
             return False

@@ -11,7 +11,7 @@ _ENABLE = const(0x800)
 _EVEN = const(0x1000)  # CTRL: DC50, a duty of one half
 
 
-def divider(mhz, period_us, clocks):
+def divider(mhz: int, period_us: int, clocks: int) -> int:
     """The divider, in 1/256, that gives `clocks` clocks in `period_us`; ValueError where there is none."""
     n, rest = divmod(256 * mhz * period_us, clocks)
     if rest:
@@ -20,18 +20,18 @@ def divider(mhz, period_us, clocks):
 
 
 @micropython.viper
-def _set(registers, control: int, divide: int):
+def _set(registers, control: int, divide: int):  # type: ignore[no-untyped-def]
     block = ptr32(registers)
     block[_CTRL] = 0
     block[_DIV] = divide
     block[_CTRL] = control
 
 
-def start(divide, registers=CLOCKS):
+def start(divide: int, registers: "int | list[int]" = CLOCKS) -> None:
     """Run the clock, from now."""
     _set(registers, _SYSTEM | _EVEN | _ENABLE, divide)
 
 
-def stop(registers=CLOCKS):
+def stop(registers: "int | list[int]" = CLOCKS) -> None:
     """Stop the clock."""
     _set(registers, 0, 256)

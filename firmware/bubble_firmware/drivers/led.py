@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """The status LED, on a GPIO that `machine.Pin` has set up (RP2040 datasheet, 2.3.1: GPIO_OUT_SET and _CLR)."""
 
 from bubble_protocol.mpy_compat import const, micropython, ptr32

@@ -33,7 +33,7 @@ _HIGH = const(8)  # turns that are at least the 500 ns that the chip must be des
 
 
 @micropython.viper
-def read(registers, gpio, select: int, channels: int, counts, at: int) -> int:
+def read(registers, gpio, select: int, channels: int, counts, at: int) -> int:  # type: ignore[no-untyped-def]
     """Convert channels 0 to `channels` - 1 into `counts[at:]`; returns how many were answered.
 
     `select` is the chip select's GPIO. A channel without an answer is ABSENT.

@@ -14,7 +14,14 @@ a fill output is on from count 0 to its width, a vent output, inverted, from its
 """
 
 from bubble_protocol.frame import copy
-from bubble_protocol.mpy_compat import const, micropython, ptr8, ptr16
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr8, ptr16
+
+if TYPE_CHECKING:
+    from array import array
+
+    from machine import I2C
+
+    from bubble_protocol.mpy_compat import Buffer
 
 _LED0 = 6
 _DIVIDE = 5  # clocks of EXTCLK per count: PRE_SCALE + 1
@@ -71,7 +78,7 @@ class Pca9685:
     `missing`: it has not answered. From then on it is left alone until `start`.
     """
 
-    def __init__(self, bus, address, first, bubbles, tick_us):
+    def __init__(self, bus: "I2C", address: int, first: int, bubbles: int, tick_us: int):
         self.missing = True
         self._bus = bus
         self._address = address
@@ -85,7 +92,7 @@ class Pca9685:
         self._turn = 0
         self._mode = bytearray(1)  # MODE1
 
-    def start(self):
+    def start(self) -> None:
         """Set the chip up, asleep, after power-on or whatever went before."""
         self.missing = False
         self._command(b"\x00\x10")  # MODE1: sleep, which PRE_SCALE and EXTCLK need
@@ -96,11 +103,11 @@ class Pca9685:
         for index in range(1, len(self._frame)):
             self._frame[index] = 255  # no output: the next `write` sends all
 
-    def wake(self):
+    def wake(self) -> None:
         """Count: outputs follow what has been written."""
         self._command(b"\x00\x60")  # MODE1: EXTCLK, auto-increment, awake
 
-    def write(self, pulses, again):
+    def write(self, pulses: "array[int]", again: bool) -> None:
         """Set the next period. What has not changed is only sent `again`, one bubble at a time, where that is wanted."""
         changed = encode(self._frame, pulses, self._first, self._bubbles, self._tick_us, self._scale)
         if again:
@@ -125,7 +132,7 @@ class Pca9685:
             changed >>= 1
             at += 8
 
-    def check(self):
+    def check(self) -> None:
         """See that the chip is there and awake: one that has lost its power sleeps."""
         self._command(b"\x00")
         if self.missing:
@@ -136,7 +143,7 @@ class Pca9685:
         except OSError:
             self.missing = True
 
-    def _command(self, data):
+    def _command(self, data: "Buffer") -> None:
         if self.missing:
             return
         try:

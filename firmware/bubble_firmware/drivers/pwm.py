@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """The RP2040's PWM block (RP2040 datasheet, 4.5): the tick's pace, a pump, and where a board wants it the valves.
 
 A slice has five registers of 32 bits, one slice after the other: CSR, DIV (8.4 bits), CTR, CC (channel A in

@@ -38,7 +38,7 @@ def _sending() -> int:
 class UsbSerial:
     """`receive` and `send` for a board's `Hal`."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         micropython.kbd_intr(-1)  # a byte of 3 is a byte
         self._in = sys.stdin.buffer
         self._out = sys.stdout.buffer
@@ -49,7 +49,7 @@ class UsbSerial:
         self._waiting = 0
         os.dupterm(self._filler)
 
-    def receive(self, buffer):
+    def receive(self, buffer: bytearray) -> int:
         """Put the bytes that have come at the start of `buffer`; returns how many."""
         filler = self._filler
         at = filler.tell()
@@ -68,7 +68,7 @@ class UsbSerial:
         copy(more, 0, count, buffer, 1)
         return 1 + count
 
-    def send(self, frame, length):
+    def send(self, frame: bytearray, length: int) -> bool:
         """Send `frame[:length]` if there is room for all of it; says whether there was."""
         if self._waiting + length > _BUFFER:
             return False
@@ -77,7 +77,7 @@ class UsbSerial:
         self._out.write(frame, length)
         return True
 
-    def close(self):
+    def close(self) -> None:
         """Give the port back to MicroPython's prompt."""
         os.dupterm(None)
         micropython.kbd_intr(3)

@@ -13,17 +13,17 @@ _ENABLE = 1 << 30
 _TIMED_OUT = 0x6AB73121  # what the SDK leaves in SCRATCH4 while the watchdog runs, but not before a wanted reset
 
 
-def has_bitten():
+def has_bitten() -> bool:
     """Whether this boot follows a time-out, not a wanted reset."""
     return machine.reset_cause() == machine.WDT_RESET and machine.mem32[_SCRATCH4] == _TIMED_OUT
 
 
-def stop():
+def stop() -> None:
     """Let the chip live without being fed."""
     machine.mem32[_CTRL_CLEAR] = _ENABLE
 
 
-def count_boot():
+def count_boot() -> int:
     """How many boots there have been since power came, this one included; anything before the first."""
     count = (machine.mem32[_SCRATCH0] & 0xFFFF) + 1
     machine.mem32[_SCRATCH0] = count
@@ -31,6 +31,6 @@ def count_boot():
 
 
 @micropython.viper
-def feed(ms: int):
+def feed(ms: int):  # type: ignore[no-untyped-def]
     """As `WDT.feed`, faster. The counter loses two every microsecond (erratum RP2040-E1)."""
     ptr32(0x40058000)[_LOAD] = ms * 2000

@@ -24,6 +24,7 @@ from bubble_firmware.hal.base import Hal
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import ModuleType
 
 # [constants] bubble_protocol.schema.faults: ESTOP SENSOR_CHIP VALVE_CHIP WATCHDOG
@@ -100,7 +101,9 @@ class PicoHal(Hal):
         self._converters = board.CONVERTERS
 
         # A default is a local: an attribute costs the chip 2.5 µs.
-        def phase_us(elapsed=pwm.elapsed, timer=_TIMER, began=self._began) -> int:
+        def phase_us(
+            elapsed: "Callable[..., int]" = pwm.elapsed, timer: int = _TIMER, began: "array[int]" = self._began
+        ) -> int:
             return elapsed(timer, began)
 
         self.phase_us = phase_us

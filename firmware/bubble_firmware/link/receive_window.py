@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """What makes every request count once: its session, its turn, and the replies kept for those that come again.
 
 Frames of another boot or another session are no frames here: their CRC is mixed with another key. Within a

@@ -5,8 +5,11 @@ another. Both are settings.
 """
 
 from bubble_firmware.safety.state import HOST_QUIET, HOST_SILENT, NO_EVENT
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.schema.modes import ACTIVE, HOLDING
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 _SILENT_MAX = const(1 << 24)  # ticks of silence counted
 
@@ -14,18 +17,18 @@ _SILENT_MAX = const(1 << 24)  # ticks of silence counted
 class Deadman:
     """`silent_ticks`: since the host's last valid frame. `tick` counts them and returns the event they make."""
 
-    def __init__(self, board):
+    def __init__(self, board: "ModuleType"):
         self.silent_ticks = 0
         self._tick_us = board.TICK_US
         self._hold_ticks = 1
         self._vent_ticks = 1
 
-    def configure(self, hold_ms: int, vent_ms: int):
+    def configure(self, hold_ms: int, vent_ms: int) -> None:
         """After how much silence of the host what moves is held, and everything is vented."""
         self._hold_ticks = self._ticks(hold_ms)
         self._vent_ticks = self._ticks(vent_ms)
 
-    def host_activity(self):
+    def host_activity(self) -> None:
         """A valid frame of the host's has come."""
         self.silent_ticks = 0
 

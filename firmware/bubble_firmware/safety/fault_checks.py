@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """Watches every bubble for what control cannot mend, and for how long it has been under pressure.
 
 `FaultMonitor.check` runs the three checks in every tick after `Bubbles.step`, on the same rows. They set the fault bits that

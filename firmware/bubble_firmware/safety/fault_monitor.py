@@ -3,7 +3,13 @@
 from array import array
 
 from bubble_firmware.safety import fault_checks
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+
+if TYPE_CHECKING:
+    from types import ModuleType
+    from typing import Any
+
+    from bubble_firmware.control.bubbles import Bubbles
 
 # [constants] bubble_firmware.safety.watch_layout: used
 _CLOSED_TICKS = const(18)
@@ -32,7 +38,7 @@ _NO_FLOW_US = const(30000)
 class FaultMonitor:
     """Watches `bubbles`. `check`, after `Bubbles.step`, returns what it has found, as bits: NEW_FAULT and those after it."""
 
-    def __init__(self, board, bubbles):
+    def __init__(self, board: "ModuleType", bubbles: "Bubbles"):
         n = board.BUBBLES
         self._bubbles = bubbles
         self._count = n
@@ -55,18 +61,23 @@ class FaultMonitor:
         # Defaults are locals, see `Bubbles`.
         work = (bubbles.state, fault_checks.check_pressures, fault_checks.check_air, fault_checks.check_lines)
 
-        def check(rows=bubbles.rows, watch=self._watch, limits=limits, work=work):
+        def check(
+            rows: memoryview = bubbles.rows,
+            watch: "array[int]" = self._watch,
+            limits: "array[int]" = limits,
+            work: "tuple[Any, ...]" = work,
+        ) -> int:
             found = work[1](rows, watch, limits, work[0])
             work[2](rows, watch, limits, work[0])
             return found | work[3](rows, watch, limits, work[0])
 
         self.check = check
 
-    def set_budget(self, kpa_s: int):
+    def set_budget(self, kpa_s: int) -> None:
         """How much pressure times time above the threshold each bubble may have."""
         self._limits[_BUDGET_MAX] = kpa_s * (1000000000 // self._tick_us)
 
-    def block_backflow(self, supply_pa: int):
+    def block_backflow(self, supply_pa: int) -> None:
         """After `Bubbles.step`: no fill valve opens to a supply below the bubble's pressure, which would empty it."""
         if supply_pa < self._supply_enough_pa:
             bubbles = self._bubbles
@@ -80,6 +91,6 @@ class FaultMonitor:
         self._watch[at] = faults
         return new
 
-    def acknowledge(self, bubble: int):
+    def acknowledge(self, bubble: int) -> None:
         """The faults of this bubble are acknowledged: those that still are there are new."""
         self._watch[bubble * _WATCH_WORDS + _LOGGED_FAULTS] = 0

@@ -8,8 +8,14 @@ and an emergency stop end the test.
 
 from array import array
 
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.schema.self_test import FAILED, NOT_RUN, PASSED, RUNNING, SKIPPED
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from bubble_firmware.control.bubbles import Bubbles
+    from bubble_firmware.control.supply import Supply
 
 # [constants] bubble_firmware.control.trim: used
 _ZERO_PA = const(1500)
@@ -34,7 +40,7 @@ _RELEASE = const(4)
 class SelfTest:
     """`outcome` of the test and, as bits, the bubbles that are ill; `tick` changes the pulses while `running`."""
 
-    def __init__(self, board, wanted):
+    def __init__(self, board: "ModuleType", wanted: bool):
         self.outcome = RUNNING if wanted else NOT_RUN
         self.untrue_zero = 0
         self.unfilled = 0
@@ -48,16 +54,16 @@ class SelfTest:
         self._rise = array("i", bytearray(4 * board.BUBBLES))
 
     @property
-    def failed(self):
+    def failed(self) -> bool:
         """Whether something was found."""
         return self.outcome == FAILED
 
-    def skip(self):
+    def skip(self) -> None:
         """End the test with what is known."""
         if self.running:
             self._end(SKIPPED)
 
-    def tick(self, bubbles, supply):
+    def tick(self, bubbles: "Bubbles", supply: "Supply") -> None:
         """One period of the test, after control has filled in `bubbles.pulses`."""
         self._time += self._tick_us
         stage = self._stage
@@ -80,23 +86,23 @@ class SelfTest:
             self.unvented = self._take_fall(bubbles)
             self._end(PASSED)
 
-    def _next(self, stage):
+    def _next(self, stage: int) -> None:
         self._stage = stage
         self._time = 0
 
-    def _end(self, outcome):
+    def _end(self, outcome: int) -> None:
         self._stage = _OFF
         self.running = False
         ill = self.untrue_zero | self.unfilled | self.unvented
         self.outcome = FAILED if ill else outcome
 
-    def _apply_pulse(self, pulses, fill_us):
+    def _apply_pulse(self, pulses: "array[int]", fill_us: int) -> None:
         for index in range(0, len(pulses), 2):
             if not self.untrue_zero >> (index >> 1) & 1:  # no air where nobody sees it
                 pulses[index] = fill_us
                 pulses[index + 1] = 0
 
-    def _take_zeros(self, bubbles):
+    def _take_zeros(self, bubbles: "Bubbles") -> int:
         ill = 0
         for i in range(bubbles.count):
             pressure = bubbles.pressure_pa(i)
@@ -105,7 +111,7 @@ class SelfTest:
                 ill |= 1 << i
         return ill
 
-    def _take_rise(self, bubbles):
+    def _take_rise(self, bubbles: "Bubbles") -> int:
         ill = 0
         for i in range(bubbles.count):
             rise = bubbles.pressure_pa(i) - self._zero[i]
@@ -114,7 +120,7 @@ class SelfTest:
                 ill |= 1 << i
         return ill
 
-    def _take_fall(self, bubbles):
+    def _take_fall(self, bubbles: "Bubbles") -> int:
         ill = 0
         for i in range(bubbles.count):
             left = bubbles.pressure_pa(i) - self._zero[i]

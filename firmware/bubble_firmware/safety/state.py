@@ -4,8 +4,11 @@ Every change of the board's state is here. `App` tells what has happened (`handl
 gets demands. docs/safety.md has the drawing, made from this table.
 """
 
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.schema.modes import ACTIVE, BOOT, FAULTED, HOLDING, IDLE, STOPPED, VENTING
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 # Events.
 NO_EVENT = -1
@@ -49,7 +52,7 @@ _VENTING_US = const(2000000)  # a full bubble is empty in half a second: what is
 class SafetyState:
     """`mode` is the state of the board, one of MODES; `handle` changes it."""
 
-    def __init__(self, board):
+    def __init__(self, board: "ModuleType"):
         self.mode = BOOT
         self._venting_max = _VENTING_US // board.TICK_US
         self._venting_ticks = 0
@@ -68,7 +71,7 @@ class SafetyState:
         self._venting_ticks = 0
         return True
 
-    def update_venting(self, pressed: int):
+    def update_venting(self, pressed: int) -> None:
         """One tick on the way to IDLE: there, when no bubble is `pressed` any longer or it has taken too long."""
         if self.mode == VENTING:
             self._venting_ticks += 1

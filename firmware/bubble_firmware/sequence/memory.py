@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
 """The records of one sequence in memory that is made once, checked as they come."""
 
 from array import array
@@ -23,7 +23,7 @@ _SPARED = const(6)  # blocks of the heap that are not ours: what is made after u
 
 
 @micropython.viper
-def _store(v: ptr32, w: ptr16, at: int, count: int, to: int):
+def _store(v: ptr32, w: ptr16, at: int, count: int, to: int):  # type: ignore[no-untyped-def]
     """Copy `count` words of `v[at:]` to `w[to:]`."""
     end = at + count
     while at < end:
