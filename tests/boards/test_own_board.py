@@ -1,6 +1,7 @@
 """An eight-bubble pad in a file outside the package: simulated, shown, planned, given tables, built, flashed."""
 
 import json
+import os
 from itertools import product
 from pathlib import Path
 
@@ -34,6 +35,8 @@ def test_it_tells_where_its_bubbles_are_and_takes_a_shape(scheme, pad8):
         try:
             find_micropython()
         except BubbleskinError as problem:
+            if os.environ.get("CI"):
+                raise
             pytest.skip(str(problem))
     with bs.connect(f"{scheme}://{pad8}?seed=3&spread=0.01") as skin:
         assert (skin.info.board, skin.info.bubbles) == ("pad8", 8)
@@ -120,6 +123,8 @@ def test_it_is_built_and_boots(pad8):
     try:
         firmware([str(pad8)])
     except BubbleskinError as problem:
+        if os.environ.get("CI"):
+            raise
         pytest.skip(str(problem))
     with bs.connect(f"rp2040://{pad8}?contact=0") as skin:
         assert skin.info.board == "pad8"

@@ -126,6 +126,8 @@ def test_the_interpreter_of_this_machine_is_like_the_rp2040():
     try:
         path = interpreter.find_micropython()
     except BubbleskinError as problem:
+        if os.environ.get("CI"):
+            raise
         pytest.skip(str(problem))
     assert unix.prove(path)
 
