@@ -40,6 +40,7 @@ class StoreMachine(RuleBasedStateMachine):
         self.number = 0
         self.stored = self.kit.FACTORY_CONTENT
         self.second = [self.kit.FACTORY_CONTENT]
+        self.rotten = set()
 
     def boot(self, *allowed):
         self.device = self.kit.Device(self.flash)
@@ -117,10 +118,15 @@ class StoreMachine(RuleBasedStateMachine):
         self.second = [*self.second, self.kit.FACTORY_CONTENT]
 
     def rot(self, slot, seed, bits):
-        """Up to three bits, which a CRC-32 always notices; not where it would only be noticed by its absence."""
+        """Up to three bits, which a CRC-32 always notices; not where it would only be noticed by its absence.
+
+        A bit rots once: if it rotted back, the record would be whole again, and a boot right to find it.
+        """
         chance = random.Random(seed)
         start = slot * self.flash.size // 2
-        for bit in chance.sample(range(8 * 44), bits):
+        sound = [bit for bit in range(8 * 44) if (slot, bit) not in self.rotten]
+        for bit in chance.sample(sound, bits):
+            self.rotten.add((slot, bit))
             self.flash.image[start + bit // 8] ^= 1 << bit % 8
 
 
