@@ -102,11 +102,13 @@ def plot_sequence(what: str, board: str, loops: int | None, rate: int, seconds: 
     """A film of a sequence: the true shapes of a simulated wristband that plays it, from above and from the side."""
     from bubbleskin.plot import sequence as film
 
-    with connect(f"sim://{board}") as skin, Progress(console=Console(stderr=True), transient=True) as bar:
+    with Progress(console=Console(stderr=True), transient=True) as bar, connect(f"sim://{board}") as skin:
         sequence = load(what, skin.layout, loops)
-        bar.add_task("playing …", total=None)
-        frames = film.watch(skin, sequence, rate=rate, seconds=seconds)
-        task = bar.add_task("drawing …", total=len(frames))
+        task = bar.add_task("playing", total=min(sequence.duration, seconds))
+        frames = film.watch(
+            skin, sequence, rate=rate, seconds=seconds, progress=lambda time: bar.update(task, completed=time)
+        )
+        task = bar.add_task("drawing", total=len(frames))
         film.animate(
             skin.layout, frames, output, title=sequence.name, progress=lambda done: bar.update(task, completed=done)
         )

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from bubbleskin.contact.energy import SPRINGS
 from bubbleskin.contact.relax import BURST, CONVERGED, extent, hold, relax
@@ -98,6 +97,8 @@ class PathFollower:
         seed: int = 0,
         resolution: Resolution = FINE,
     ) -> None:
+        from scipy.spatial import cKDTree
+
         self.bubbles, self.state = bubbles, state.copy()
         self.springs = np.array([springs], SPRINGS)[0]
         self.pairs: NDArray[np.int64] = np.empty((0, 2), np.int64)

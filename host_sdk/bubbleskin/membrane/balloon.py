@@ -13,7 +13,6 @@ from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from bubbleskin.checks import Numbers, finite, like, number, one_of, positive
 from bubbleskin.errors import InvalidInput
@@ -319,6 +318,8 @@ class YeohBalloon:
 
         Equal areas in the P-V plane: below it the small state is the favoured one, above it the large.
         """
+        from scipy.optimize import brentq
+
         points = self.limit_points()
         if len(points) < 2:
             return None

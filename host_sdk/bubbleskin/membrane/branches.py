@@ -7,7 +7,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 Function = Callable[[Any], Any]  # of arrays and of single numbers
 
@@ -23,6 +22,8 @@ def turning_points(slope: Function, low: float, high: float) -> list[float]:
     A pair of turning points closer than the scan's step is found too: wherever the slope dips towards
     zero between two scanned points, its minimum is sought first.
     """
+    from scipy.optimize import brentq, minimize_scalar
+
     x = np.geomspace(low, high, SCAN)
     s = slope(x)
     dips = np.flatnonzero((s[1:-1] > 0) & (s[1:-1] <= s[:-2]) & (s[1:-1] <= s[2:])) + 1

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from bubbleskin.checks import Numbers, finite, like, positive
 from bubbleskin.errors import InvalidInput
@@ -168,6 +167,8 @@ class YeohFit:
         }
 
     def _quantile(self, level: float) -> float:
+        from scipy import stats
+
         if not 0 < level < 1:
             raise InvalidInput(f"level is {level:g}, but a confidence level lies between 0 and 1 (0.95).")
         return float(stats.t.ppf((1 + level) / 2, self.dof))
@@ -289,6 +290,8 @@ def _repeats(
     points: Points, solution: Solution, distances: np.ndarray, step: np.ndarray
 ) -> tuple[Repeats | None, float]:
     """Noise between repeats, and the variance of the settings' means about the curve per repeat."""
+    from scipy import stats
+
     if step.shape != distances.shape:
         raise InvalidInput(f"step must name the setting of each of the {distances.size} points.")
     good = solution.weights > 0

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane import wall as walls
@@ -199,6 +198,8 @@ def good_points(residuals: np.ndarray, scale: float, fitted: float = 3) -> np.nd
 
     The fewer the points, the less is known of the scale, and the further out a point must be.
     """
+    from scipy import stats
+
     cut = float(stats.t.isf(LOST / 2, max(residuals.size - fitted, 1.0)))
     good = np.abs(residuals) <= cut * scale
     if good.sum() < 4:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
@@ -61,56 +63,92 @@ def colours() -> ScalarMappable:
     return ScalarMappable(Normalize(LOW_MM, HIGH_MM), "viridis")
 
 
-def colour(height_mm: float) -> tuple[float, float, float]:
-    """Red, green and blue of a height."""
-    red, green, blue, _ = colours().to_rgba(np.array([height_mm]))[0].tolist()
-    return red, green, blue
+class Above:
+    """The array from above: spheres at their places, lower ones beneath; forces of contact as lines between centres.
+
+    Everything that moves is drawn by `update`, which may be called again and again: `artists` are those things.
+    """
+
+    def __init__(self, axes: Axes, layout: Layout, *, numbers: bool = True) -> None:
+        self._axes = axes
+        self._circles = [axes.add_patch(Circle((0, 0))) for _ in range(len(layout))]
+        self._numbers = [axes.text(0, 0, "", ha="center", va="center", fontsize=7, zorder=5) for _ in self._circles]
+        self._numbered = numbers
+        self._forces: list[Line2D] = []
+        reach = np.abs(layout.positions_mm).max() + layout.pitch_mm
+        axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xticks=[], yticks=[])
+        axes.grid(False)
+
+    def update(self, shape: Bubbles) -> None:
+        """Put everything where it is in `shape`."""
+        centre, radius = 1e3 * shape.position, 1e3 * shape.radius
+        paint = colours().to_rgba(shape.height_mm, alpha=0.9)
+        for place, bubble in enumerate(np.argsort(centre[:, 2])):
+            circle, number = self._circles[bubble], self._numbers[bubble]
+            circle.set(center=centre[bubble, :2], radius=radius[bubble], color=paint[bubble], zorder=_order(place))
+            red, green, blue, _ = paint[bubble]
+            dark = 0.3 * red + 0.6 * green + 0.1 * blue < 0.5
+            shown = self._numbered and radius[bubble] > 3
+            text = f"{bubble}\n{shape.height_mm[bubble]:.1f}" if shown else ""
+            number.set(position=centre[bubble, :2], text=text, color="white" if dark else "black")
+        for line in self._forces:
+            line.remove()
+        self._forces = []
+        for contact in shape.contacts:
+            ends = centre[[contact.first, contact.second]]
+            width = 0.6 + 8 * contact.force
+            self._forces += self._axes.plot(ends[:, 0], ends[:, 1], color="#D55E00", lw=width, alpha=0.8, zorder=4)
+
+    @property
+    def artists(self) -> list[Artist]:
+        """What `update` moves, as of the last."""
+        return [*self._circles, *self._forces, *self._numbers]
+
+
+class Side:
+    """The array from the side, along y: spheres on their base or lifted off it; a line where each was asked to end.
+
+    `update` and `artists` are as those of `Above`; the base plane is one of these, because it is drawn over the spheres.
+    """
+
+    def __init__(self, axes: Axes, layout: Layout, asked_mm: NDArray[np.float64] | None = None) -> None:
+        self._circles = [axes.add_patch(Circle((0, 0), edgecolor="white")) for _ in range(len(layout))]
+        if asked_mm is not None:
+            x = layout.positions_mm[:, 0]
+            axes.hlines(asked_mm, x - 2, x + 2, color="#D55E00", lw=1.5, label="asked", zorder=4)
+            axes.legend(loc="upper right")
+        self._base = axes.axhline(0, color="black", lw=1)
+        reach = np.abs(layout.positions_mm[:, 0]).max() + layout.pitch_mm
+        axes.set(xlim=(-reach, reach), ylim=(0, HIGH_MM + 2), aspect="equal", xticks=[], ylabel="mm")
+        axes.grid(False)
+
+    def update(self, shape: Bubbles) -> None:
+        """Put everything where it is in `shape`."""
+        centre, radius = 1e3 * shape.position, 1e3 * shape.radius
+        paint = colours().to_rgba(shape.height_mm, alpha=0.9)
+        for place, bubble in enumerate(np.argsort(-centre[:, 1])):
+            circle, where = self._circles[bubble], centre[bubble, [0, 2]]
+            circle.set(center=where, radius=radius[bubble], facecolor=paint[bubble], zorder=_order(place))
+
+    @property
+    def artists(self) -> list[Artist]:
+        """What `update` moves, and the base plane."""
+        return [*self._circles, self._base]
+
+
+def _order(place: int) -> float:
+    """Height of the `place`-th sphere in the picture: above those before it, below lines, which are at 2."""
+    return 1 + place / (place + 1)
 
 
 def draw_above(axes: Axes, layout: Layout, shape: Bubbles, *, numbers: bool = True) -> None:
-    """The array from above: spheres at their places, lower ones beneath; forces of contact as lines between centres."""
-    centre = 1e3 * shape.position
-    for bubble in np.argsort(centre[:, 2]):
-        height = float(shape.height_mm[bubble])
-        x, y = centre[bubble, :2].tolist()
-        red, green, blue = colour(height)
-        axes.add_patch(Circle((x, y), 1e3 * shape.radius[bubble], color=(red, green, blue), alpha=0.9))
-        if numbers and 1e3 * shape.radius[bubble] > 3:
-            dark = 0.3 * red + 0.6 * green + 0.1 * blue < 0.5
-            ink = "white" if dark else "black"
-            axes.text(
-                x,
-                y,
-                f"{bubble}\n{height:.1f}",
-                ha="center",
-                va="center",
-                color=ink,
-                fontsize=7,
-                zorder=5,
-            )
-    for contact in shape.contacts:
-        ends = centre[[contact.first, contact.second]]
-        axes.plot(ends[:, 0], ends[:, 1], color="#D55E00", lw=0.6 + 8 * contact.force, alpha=0.8, zorder=4)
-    reach = np.abs(layout.positions_mm).max() + layout.pitch_mm
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xticks=[], yticks=[])
-    axes.grid(False)
+    """One picture of `Above`."""
+    Above(axes, layout, numbers=numbers).update(shape)
 
 
 def draw_side(axes: Axes, layout: Layout, shape: Bubbles, asked_mm: NDArray[np.float64] | None = None) -> None:
-    """The array from the side, along y: spheres on their base or lifted off it; a line where each was asked to end."""
-    centre = 1e3 * shape.position
-    for bubble in np.argsort(-centre[:, 1]):
-        x, _, z = centre[bubble].tolist()
-        face = (*colour(float(shape.height_mm[bubble])), 0.9)
-        axes.add_patch(Circle((x, z), 1e3 * shape.radius[bubble], facecolor=face, edgecolor="white"))
-    if asked_mm is not None:
-        x = layout.positions_mm[:, 0]
-        axes.hlines(asked_mm, x - 2, x + 2, color="#D55E00", lw=1.5, label="asked", zorder=4)
-        axes.legend(loc="upper right")
-    reach = np.abs(layout.positions_mm[:, 0]).max() + layout.pitch_mm
-    axes.axhline(0, color="black", lw=1)
-    axes.set(xlim=(-reach, reach), ylim=(0, HIGH_MM + 2), aspect="equal", xticks=[], ylabel="mm")
-    axes.grid(False)
+    """One picture of `Side`."""
+    Side(axes, layout, asked_mm).update(shape)
 
 
 def plot_plan(plan: Plan, contact: CompliantContact, start: Shape | None = None) -> Figure:

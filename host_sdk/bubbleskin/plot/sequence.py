@@ -5,18 +5,20 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.plot.contact import colours, draw_above, draw_side
+from bubbleskin.plot.contact import Above, Side, colours
 from bubbleskin.plot.membrane import STYLE
 from bubbleskin.sequence.model import Sequence as BubbleSequence
 from bubbleskin.skin import Skin
@@ -37,24 +39,34 @@ class Frame(NamedTuple):
     contacts: tuple[()] = ()
 
 
-def watch(skin: Skin, sequence: BubbleSequence, *, rate: int = 15, seconds: float = 30.0) -> list[Frame]:
+def watch(
+    skin: Skin,
+    sequence: BubbleSequence,
+    *,
+    rate: int = 15,
+    seconds: float = 30.0,
+    progress: Callable[[float], None] = lambda time: None,
+) -> list[Frame]:
     """Play `sequence` on the simulated wristband behind `skin`; its true shapes, `rate` times a second, to its end.
 
-    At most `seconds` of it. Raises `InvalidInput` where there is no simulated wristband.
+    Frames are whole hundredths of a second apart, because a GIF counts in those. At most `seconds` of it. `progress` is
+    called with the seconds seen so far. Raises `InvalidInput` where there is no simulated wristband.
     """
     board = skin.simulated
     if board is None:
         raise InvalidInput("A film needs a simulated wristband: nobody sees the true shape of a real one.")
+    apart = round(100 / rate) / 100
     skin.play(sequence, wait=False)
     begin = board.time
-    frames = []
-    while board.time - begin < seconds:
+    frames: list[Frame] = []
+    while len(frames) * apart < seconds:
         plant = board.plant
         radius = plant.parameters.radius * plant.stretch
-        frames.append(Frame(board.time - begin, plant.height_mm, plant.position_m, radius))
-        skin.sleep(1 / rate)
+        frames.append(Frame(len(frames) * apart, plant.height_mm, plant.position_m, radius))
+        progress(frames[-1].time)
         if skin.playing().state == "ended":
             break
+        skin.sleep(max(begin + len(frames) * apart - board.time, 0.0))
     return frames
 
 
@@ -77,23 +89,51 @@ def animate(
         raise InvalidInput(f"{path} ends in {path.suffix or 'nothing'}; a film is a .gif or an .mp4.")
     if path.suffix == ".mp4" and not shutil.which("ffmpeg"):
         raise InvalidInput("An .mp4 needs the program ffmpeg, which is not here. Install it, or write a .gif.")
-    rate = round((len(frames) - 1) / (frames[-1].time - frames[0].time))
+    rate = (len(frames) - 1) / (frames[-1].time - frames[0].time) * (1 - 1e-9)  # the writer rounds ms per frame down
     writer = FFMpegWriter(fps=rate) if path.suffix == ".mp4" else PillowWriter(fps=rate)
     with rc_context(STYLE):
-        figure = Figure(figsize=(4.2, 6.0), layout="constrained")
-        FigureCanvasAgg(figure)
-        above, side = figure.subplots(2, 1, height_ratios=(1.7, 1))
-        figure.colorbar(colours(), ax=[above, side], label="height (mm)", shrink=0.6)
+        picture = _Picture(layout)
         try:
-            with writer.saving(figure, str(path), _DPI):
+            with writer.saving(picture, str(path), _DPI):
                 for done, frame in enumerate(frames, 1):
-                    for axes in (above, side):
-                        axes.clear()
-                    draw_above(above, layout, frame)
-                    draw_side(side, layout, frame)
-                    above.set_title(f"{title}  {frame.time:.1f} s".strip(), loc="left")
+                    picture.show(frame, f"{title}  {frame.time:.1f} s".strip())
                     writer.grab_frame()
                     progress(done)
         except OSError as error:
             raise InvalidInput(f"Cannot write the film {path}: {error.strerror}.") from None
     return path
+
+
+class _Picture(Figure):
+    """The array from above and from the side: what stays is drawn once, and kept as pixels; what moves is drawn over it."""
+
+    def __init__(self, layout: Layout) -> None:
+        super().__init__(figsize=(4.2, 6.0), dpi=_DPI, layout="constrained")
+        self._pixels = FigureCanvasAgg(self)
+        above, side = self.subplots(2, 1, height_ratios=(1.7, 1))
+        self.colorbar(colours(), ax=[above, side], label="height (mm)", shrink=0.6)
+        self._views = Above(above, layout), Side(side, layout)
+        self._title = above.set_title("0.0 s", loc="left")
+        # Axes are drawn over what moves, and so with it.
+        self._moving = [*self._title_and_spines(above, side), *self._views[0].artists, *self._views[1].artists]
+        for artist in self._moving:
+            artist.set_animated(True)
+        self._pixels.draw()
+        self.set_layout_engine("none")  # places are found: they stay
+        self._still = self._pixels.copy_from_bbox(self.bbox)
+
+    def _title_and_spines(self, *axes: Axes) -> list[Artist]:
+        return [self._title, *(spine for one in axes for spine in one.spines.values())]
+
+    def show(self, frame: Frame, title: str) -> None:
+        """Draw `frame`."""
+        for view in self._views:
+            view.update(frame)
+        self._title.set_text(title)
+        self._pixels.restore_region(self._still)
+        for artist in sorted(self._moving, key=Artist.get_zorder):
+            self.draw_artist(artist)
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Give the pixels as they are: writers of films ask for them so, and would have everything drawn again."""
+        fname.write(self._pixels.buffer_rgba())
