@@ -90,13 +90,15 @@ def animate(
     if path.suffix == ".mp4" and not shutil.which("ffmpeg"):
         raise InvalidInput("An .mp4 needs the program ffmpeg, which is not here. Install it, or write a .gif.")
     rate = (len(frames) - 1) / (frames[-1].time - frames[0].time) * (1 - 1e-9)  # the writer rounds ms per frame down
-    writer = FFMpegWriter(fps=rate) if path.suffix == ".mp4" else PillowWriter(fps=rate)
+    # fps may be a fraction, other than its type says.
+    make: Any = FFMpegWriter if path.suffix == ".mp4" else PillowWriter
+    writer = make(fps=rate)
     with rc_context(STYLE):
         picture = _Picture(layout)
         try:
             with writer.saving(picture, str(path), _DPI):
                 for done, frame in enumerate(frames, 1):
-                    picture.show(frame, f"{title}  {frame.time:.1f} s".strip())
+                    picture.draw_frame(frame, f"{title}  {frame.time:.1f} s".strip())
                     writer.grab_frame()
                     progress(done)
         except OSError as error:
@@ -125,8 +127,8 @@ class _Picture(Figure):
     def _title_and_spines(self, *axes: Axes) -> list[Artist]:
         return [self._title, *(spine for one in axes for spine in one.spines.values())]
 
-    def show(self, frame: Frame, title: str) -> None:
-        """Draw `frame`."""
+    def draw_frame(self, frame: Frame, title: str) -> None:
+        """Draw `frame` over what stays."""
         for view in self._views:
             view.update(frame)
         self._title.set_text(title)
