@@ -16,6 +16,7 @@ TYPE_CHECKING = False  # as in `typing`: a type checker takes it for true
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from types import FunctionType
     from typing import Any
 
     Buffer = bytes | bytearray | memoryview
@@ -34,25 +35,32 @@ try:
 
 except ImportError:
     COMPILED = False
+    VIPER: "list[tuple[FunctionType, FunctionType]]" = []
+    """Every viper function so far: (what callers hold, the function as it is written)."""
+    on_viper: "Callable[[FunctionType, FunctionType], None] | None" = None
+    """Called with every further one, where somebody compiles them."""
 
     class micropython:  # type: ignore[no-redef]  # noqa: N801
         """The decorators that the device's compiler knows, as plain functions."""
 
         @staticmethod
-        def viper(function: "Callable[..., Any]") -> "Callable[..., Any]":
+        def viper(function: "FunctionType") -> "FunctionType":
             """Leave the function as it is, but for casting the arguments that are annotated as pointers to half words."""
             code = function.__code__
             casts = []
             for name in code.co_varnames[: code.co_argcount]:
                 kind = function.__annotations__.get(name)
                 casts.append(kind if kind is ptr16 else None)  # the others leave a buffer as it is
-            if not any(casts):
-                return function
+            held = function
+            if any(casts):
 
-            def called(*arguments: "Any") -> "Any":
-                return function(*[cast(a) if cast else a for cast, a in zip(casts, arguments, strict=True)])
+                def held(*arguments: "Any", _function: "Any" = function, _casts: "Any" = casts) -> "Any":  # type: ignore[misc]
+                    return _function(*[cast(a) if cast else a for cast, a in zip(_casts, arguments, strict=True)])
 
-            return called
+            VIPER.append((held, function))
+            if on_viper:
+                on_viper(held, function)
+            return held
 
     def const(value: int) -> int:
         """Leave the value as it is."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from bubble_firmware.app import App
 from bubble_firmware.hal.base import Hal
+from bubbleskin.sim import jit
 from bubbleskin.sim.flash import NorFlash
 
 
@@ -46,6 +47,7 @@ class InProcessFirmware(Firmware, Hal):
     """The firmware in this very interpreter. It is also the hardware under it."""
 
     def __init__(self, board: ModuleType, boot_id: int, flash: NorFlash | None = None):
+        jit.enable()
         super().__init__(board)
         self.boot_id = boot_id
         self.flash = flash or NorFlash()
