@@ -115,7 +115,7 @@ def test_random_programs_give_the_same_on_micropython(sources, x, y, micropython
         buffers = memory()
         memo = [None, 0, None] * 3
         for at, buffer in enumerate(buffers):
-            install._locate(memo, 3 * at, buffer)
+            install.locate(memo, 3 * at, buffer)
         answer = made[f"compiled_program{number}"](memo[1], memo[4], memo[7], x, y)
         assert f"{answer} {' '.join(str(list(buffer)) for buffer in buffers)}" == line, texts[number]
 
@@ -133,7 +133,7 @@ def test_every_viper_function_that_runs_here_is_understood():
     install.enable()
     for name in ("control.bubbles", "app", "sequence.player", "store.slots", "link.server"):
         importlib.import_module(f"bubble_firmware.{name}")
-    modules = {name: functions for name, functions in install._functions.items() if ".drivers." not in name}
+    modules = {name: functions for name, functions in install.functions_of.items() if ".drivers." not in name}
     assert sum(len(functions) for functions in modules.values()) > 30
     for name, functions in modules.items():
         source = translate.compiled_source(functions, vars(sys.modules[name]))

@@ -78,6 +78,7 @@ class Clock:
         self._newest = 0.0
         self._ticks: int | None = None  # the newest reading, unwrapped
         self._arrays: tuple[NDArray[np.float64], ...] | None = None
+        self._drift = 0.0  # one that was possible when last all were reckoned
 
     def observe(self, sent: float, received: float, device_ticks: int, phase_us: int) -> None:
         """Take one round trip: host times in s, and the device's answer."""
@@ -174,9 +175,13 @@ class Clock:
                 old.pings + 1,
             )
         self._best[bucket] = best
+        self._newest = received
+        if self._arrays and old and next(reversed(self._best)) == bucket:
+            for of_all, of_newest in zip(self._arrays, best, strict=False):
+                of_all[-1] = of_newest
+            return
         for gone in [key for key in self._best if key <= bucket - _BUCKETS]:
             del self._best[gone]
-        self._newest = received
         self._arrays = None
 
     def _points(self) -> tuple[NDArray[np.float64], ...]:
@@ -188,8 +193,14 @@ class Clock:
         return self._arrays
 
     def _is_impossible(self) -> bool:
-        """Whether no drift agrees with all round trips."""
+        """Whether no drift agrees with all round trips. One that did before mostly does now."""
+        received, low, sent, high = self._points()
+        a, b = self._newest - received, self._newest - sent
+        lowest, highest = low + a * (self._drift - WANDER / 2 * a), high + b * (self._drift + WANDER / 2 * b)
+        if lowest.max() <= highest.min():
+            return False
         bounds = self._bounds(self._newest)
+        self._drift = (bounds.drift_low + bounds.drift_high) / 2 if np.isfinite(bounds.drift_low) else 0.0
         return bounds.drift_low > bounds.drift_high
 
     def _bounds(self, host_time: float) -> _Bounds:

@@ -110,7 +110,7 @@ class SimulatedBoard(Simulated):
         self._pump = 0.0  # duty, 0 to 1
         self._dump = False
         self._counts = array("H", bytes(2 * (n + 1)))
-        self._bubble_counts = np.frombuffer(self._counts, np.uint16)[:n]  # the same memory
+        self._sensed = np.frombuffer(self._counts, np.uint16)  # the same memory
         self._decided: array | None = None  # what `_pulses` were made from
 
     @property
@@ -130,8 +130,7 @@ class SimulatedBoard(Simulated):
 
     def tick(self) -> None:
         """One period: the firmware reads the sensors and decides, while the plant goes on as decided before."""
-        self._bubble_counts[:] = self.plant.sense()
-        self._counts[-1] = self.plant.sense_supply()
+        self.plant.read(self._sensed)
         outputs = self.firmware.tick(self._counts, self._link_in())
         self.plant.advance(self.tick_s, self._pulses[:, 0], self._pulses[:, 1], self._pump, self._dump)
         self._take(outputs)

@@ -165,16 +165,20 @@ def _compile(stamp: int):  # type: ignore[no-untyped-def]
             air.vented += h * vented
 
     @njit(cache=True)
-    def sense(state, constants, noise, pa_per_count, counts):  # type: ignore[no-untyped-def]
+    def sense(bubbles, reservoir, noise, pa_per_count, counts):  # type: ignore[no-untyped-def]
         _ = stamp
+        state, constants = bubbles
         for i in range(len(state)):
             s, p = state[i], constants[i]
             gauge = (s.node - ATMOSPHERE) * p.sensor_gain + p.sensor_offset + s.sensor_bias
-            counts[i] = _sensor_counts(gauge, p.sensor_noise * noise[i], pa_per_count)
+            counts[i] = _sensor_counts(gauge, p.sensor_noise * noise[i], pa_per_count[0])
             if s.sensor_stuck > 0.0:
                 counts[i] = s.sensor_stuck
             if s.sensor_absent > 0.0:
                 counts[i] = 0
+        air, supply = reservoir[0][0], reservoir[1][0]
+        gauge = air.pressure - ATMOSPHERE + supply.sensor_offset
+        counts[-1] = _sensor_counts(gauge, supply.sensor_noise * noise[-1], pa_per_count[1])
 
     return advance, sense
 

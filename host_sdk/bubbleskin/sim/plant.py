@@ -16,7 +16,6 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import ATMOSPHERE, yeoh_pressure
 from bubbleskin.sim import kernel
 from bubbleskin.sim.parameters import PlantParameters, Supply
-from bubbleskin.sim.pneumatics import sensor_counts
 
 if TYPE_CHECKING:
     from bubbleskin.contact.model import CompliantContact
@@ -36,8 +35,8 @@ REACH = 18e-3
 BARBS = 10e-6
 """How far barbs are from where they should be, RMS in m. A perfectly even ring would never fall to one side."""
 
-PA_PER_COUNT = 17.0
-SUPPLY_PA_PER_COUNT = 25.0
+PA_PER_COUNT = (17.0, 25.0)
+"""Of the sensors of bubbles and reservoir."""
 
 
 class Plant:
@@ -69,7 +68,7 @@ class Plant:
         self._supply = np.array([astuple(parameters.supply)], kernel.SUPPLY)
         self._air = np.array([(ATMOSPHERE + supply_pa, 0.0, 0.0)], kernel.AIR)
         self._fill_on, self._vent_on = np.zeros(n), np.zeros(n)
-        self._noise = np.zeros(n)
+        self._noise = np.zeros(n + 1)
         self._rng = np.random.default_rng(seed)
         self._place = np.zeros((n if contact else 0, 4))
         """Centre x, y, z and radius of each bubble, m: the state of `contact.energy`. No rows without contact."""
@@ -118,18 +117,22 @@ class Plant:
             )
         self.time += dt
 
+    def read(self, counts: NDArray[np.uint16]) -> None:
+        """Read all sensors into `counts`, (n + 1,): those of the bubbles as of `sense`, the reservoir's last."""
+        self._rng.standard_normal(out=self._noise)
+        kernel.sense(self._bubbles, self._reservoir, self._noise, PA_PER_COUNT, counts)
+
     def sense(self) -> NDArray[np.uint16]:
         """Read the bubbles' sensors, at the valve nodes: (n,) counts of 17 Pa, 160 at zero gauge."""
-        counts = np.empty(len(self._state), np.uint16)
-        self._rng.standard_normal(out=self._noise)
-        kernel.sense(self._state, self._constants, self._noise, PA_PER_COUNT, counts)
-        return counts
+        counts = np.empty(len(self._state) + 1, np.uint16)
+        self.read(counts)
+        return counts[:-1]
 
     def sense_supply(self) -> int:
         """Read the reservoir's sensor: counts of 25 Pa, 160 at zero gauge."""
-        supply = self.parameters.supply
-        noise = supply.sensor_noise * self._rng.standard_normal()
-        return sensor_counts(self.supply_pa + supply.sensor_offset, noise, SUPPLY_PA_PER_COUNT)
+        counts = np.empty(len(self._state) + 1, np.uint16)
+        self.read(counts)
+        return int(counts[-1])
 
     def inject(self, fault: str, bubble: int, value: float = 1.0) -> None:
         """Make something of `bubble` fail; a value of 0 mends it. `fault` and what its value means:

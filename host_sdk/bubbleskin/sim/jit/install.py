@@ -28,7 +28,7 @@ SWITCH = "BUBBLESKIN_JIT"
 MODES = ("1", "0", "check")
 
 _lock = threading.RLock()
-_functions: dict[str, dict[str, FunctionType]] = {}  # as they are written, by module and name
+functions_of: dict[str, dict[str, FunctionType]] = {}  # as they are written, by module and name
 _held: dict[str, dict[str, FunctionType]] = {}  # what callers hold
 _plain: dict[tuple[str, str], tuple[CodeType, dict[str, Any] | None]] = {}
 _said: set[str] = set()
@@ -63,7 +63,7 @@ def _await(held: FunctionType, function: FunctionType) -> None:
     """Let the first call of this function compile its module."""
     module, name = function.__module__, function.__name__
     written = FunctionType(function.__code__, function.__globals__, name)  # the code is about to be another
-    _functions.setdefault(module, {})[name] = written
+    functions_of.setdefault(module, {})[name] = written
     _held.setdefault(module, {})[name] = held
     _plain[module, name] = held.__code__, held.__kwdefaults__
 
@@ -78,12 +78,12 @@ def _await(held: FunctionType, function: FunctionType) -> None:
 def _compile(module: str) -> None:
     with _lock:
         waiting = _held.pop(module, {})
-        made = _made(module, _functions[module]) if waiting else None  # else another thread has been faster
+        made = _made(module, functions_of[module]) if waiting else None  # else another thread has been faster
         for name, held in waiting.items():
             if made is None:
                 held.__code__, held.__kwdefaults__ = _plain[module, name]
             else:
-                _fill(held, _functions[module][name], getattr(made, f"compiled_{name}"))
+                _fill(held, functions_of[module][name], getattr(made, f"compiled_{name}"))
 
 
 def _made(module: str, functions: dict[str, FunctionType]) -> ModuleType | None:
@@ -140,21 +140,21 @@ def _fill(held: FunctionType, function: FunctionType, compiled: Callable[..., An
         if name in places:
             at = len(memo)
             memo += [None, 0, None]  # the buffer, its address, what keeps it where it is
-            lines.append(f"    if {name} is not _memo[{at}]:\n        _locate(_memo, {at}, {name})\n")
+            lines.append(f"    if {name} is not _memo[{at}]:\n        locate(_memo, {at}, {name})\n")
             given.append(f"_memo[{at + 1}]")
         else:
             given.append(name)
-    source = f"def called({', '.join(names)}, *, _call, _memo, _locate):\n{''.join(lines)}    return _call({', '.join(given)})\n"
+    source = f"def called({', '.join(names)}, *, _call, _memo, locate):\n{''.join(lines)}    return _call({', '.join(given)})\n"
     space: dict[str, Any] = {}
     exec(source, space)
     held.__code__ = space["called"].__code__
-    held.__kwdefaults__ = {"_call": compiled, "_memo": memo, "_locate": _locate}
+    held.__kwdefaults__ = {"_call": compiled, "_memo": memo, "locate": locate}
 
 
 _NOTHING = ctypes.c_char * 0
 
 
-def _locate(memo: list[Any], at: int, buffer: Any) -> None:
+def locate(memo: list[Any], at: int, buffer: Any) -> None:
     """Remember where `buffer` is. The hold on it makes Python refuse to move it."""
     if isinstance(buffer, bytes):
         hold: Any = ctypes.c_char_p(buffer)
