@@ -36,7 +36,7 @@ test: setup lint generated micropython ## every check that needs no hardware, 16
 chip: setup micropython ## build the RP2040's firmware, run its tests and hil_tests on an emulated chip, 20 minutes
 	$(BIN)/bubbleskin firmware build
 	$(BIN)/python -m pytest -n 2 -m "chip and not long"
-	$(BIN)/python -m pytest -n 2 --timeout 600 hil_tests $(EMULATED)
+	$(BIN)/python -m pytest -n 2 hil_tests $(EMULATED)
 
 chip-long: setup micropython ## what takes longer on an emulated chip
 	$(BIN)/bubbleskin firmware build

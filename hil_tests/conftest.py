@@ -13,6 +13,8 @@ import bubbleskin as bs
 
 TARGETS = ("sim://wristband7?contact=0", "micropython://wristband7?contact=0")
 """Bubbles that stand alone: these tests are of the firmware, which cannot see that a neighbour lifts a bubble."""
+EMULATED_SLOWNESS = 10
+"""Times as long as on a real board, at most: guards against hangs are longer by this on an emulated chip."""
 FLAT_KPA = 0.4  # sensor noise is 50 Pa
 
 
@@ -31,16 +33,20 @@ def pytest_generate_tests(metafunc):
 
 
 def pytest_collection_modifyitems(config, items):
-    """An emulated chip takes 20 times longer than a real one: there, tests marked `long` are left out."""
+    """An emulated chip takes 20 times longer than a real one: there, tests marked `long` are left out, hangs found later."""
 
-    def is_left_out(item):
+    def is_emulated(item):
         target = item.callspec.params.get("target", "") if hasattr(item, "callspec") else ""
-        return target.startswith("rp2040:") and item.get_closest_marker("long") is not None
+        return target.startswith("rp2040:")
 
-    left_out = [item for item in items if is_left_out(item)]
+    left_out = [item for item in items if is_emulated(item) and item.get_closest_marker("long")]
+    for item in items:
+        guard = item.get_closest_marker("timeout")
+        if guard and is_emulated(item):
+            item.add_marker(pytest.mark.timeout(EMULATED_SLOWNESS * guard.args[0]), append=False)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not is_left_out(item)]
+        items[:] = [item for item in items if item not in left_out]
 
 
 def connect(target: str) -> bs.Skin:
