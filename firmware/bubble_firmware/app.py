@@ -90,7 +90,7 @@ class App:
             StoreHandlers(reply, hal, state, self.store),
             LayoutHandlers(reply, board, self.clock),
             SettingHandlers(reply, self.clock, self.settings),
-            FaultHandlers(reply, state, self.commands),
+            FaultHandlers(reply, board, state, self.commands),
             SystemHandlers(self.server, hal, state, self.stats, self.tables, self.store, self.commands),
             self.sequence_handlers,
         ):
@@ -145,7 +145,7 @@ class App:
         bubbles.step(counts, supply.pressure_pa, safety.control_mode)
         self.fault_monitor.block_backflow(supply.pressure_pa)
 
-        # Is any of it wrong? A bubble with a fault is vented from the next tick on.
+        # Is any of it wrong? A bubble with a fault is vented, whatever was decided.
         found = self.fault_monitor.check()
         self._moves = found & _MOVING_BUBBLE
         safety.update_venting(found & _PRESSED_BUBBLE)
@@ -153,6 +153,7 @@ class App:
             self.faults.latch_bubbles()
             if found & _OVERFILLED_BUBBLE:
                 self.commands.fault(_OVERFILLED)
+                self.fault_monitor.open_vents()
         if safety.mode == _BOOT:
             self._test()
 
@@ -175,6 +176,8 @@ class App:
 
     def _communicate(self) -> None:
         hal = self.hal
+        if self.faults.waiting:
+            self.commands.release()
         self.server.poll()
         if self.player.events_waiting:
             self.sequence_handlers.send_events()

@@ -25,4 +25,4 @@ class BoardState:
         self.safety = SafetyState(board)
         self.deadman = Deadman(board)
         self.fault_monitor = FaultMonitor(board, bubbles)
-        self.faults = LatchedFaults(self.clock, self.supply, bubbles, self.fault_monitor)
+        self.faults = LatchedFaults(board, self.clock, self.supply, bubbles, self.fault_monitor)

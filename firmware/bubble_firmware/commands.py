@@ -81,11 +81,15 @@ class Commands:
 
     def acknowledge(self, up_to: int) -> None:
         """Acknowledge the fault log up to this entry: faults that still are there come again."""
-        if self._faults.acknowledge(up_to):
+        self._faults.acknowledge(up_to, self._hal.active_faults & _ESTOP)
+        self.release()
+
+    def release(self) -> None:
+        """Let go on what is acknowledged and has been isolated for long enough."""
+        if self._faults.release():
+            self._supply.clear()
             self._hal.clear_faults()
             self._safety.handle(_EVENT_CLEAR)
-            if self._hal.active_faults & _ESTOP:  # still pressed
-                self.fault(_ESTOP)
 
     def restart(self, into: int) -> None:
         """Vent and start again."""

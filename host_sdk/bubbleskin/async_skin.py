@@ -228,7 +228,7 @@ class AsyncSkin:
 
     async def clear_faults(self) -> None:
         """See `Skin.clear_faults`."""
-        await self.link.call("CLEAR")
+        await self._isolation(await self.link.call("CLEAR"))
 
     async def fault_log(self) -> list[Fault]:
         """See `Skin.fault_log`."""
@@ -236,7 +236,13 @@ class AsyncSkin:
 
     async def acknowledge(self, fault: Fault | int) -> None:
         """See `Skin.acknowledge`."""
-        await self.link.call("FAULTS_ACK", (fault.id if isinstance(fault, Fault) else fault,))
+        await self._isolation(await self.link.call("FAULTS_ACK", (fault.id if isinstance(fault, Fault) else fault,)))
+
+    async def _isolation(self, acknowledged: Message) -> None:
+        """Wait until what is acknowledged has been isolated for long enough, and the wristband lets go of it."""
+        left_ms = acknowledged["isolated_ms"]
+        if left_ms:
+            await self.sleep(left_ms * 1e-3 + self.info.tick)
 
     async def settings(self) -> dict[str, Setting]:
         """See `Skin.settings`."""

@@ -196,7 +196,10 @@ class Skin:
         return run_sync(self._skin.faults())
 
     def clear_faults(self) -> None:
-        """Acknowledge all faults, the board's too: they are forgotten; what still is wrong faults again."""
+        """Acknowledge all faults, the board's too: they are forgotten; what still is wrong faults again.
+
+        A fault isolates for a second at least: this waits until that is over.
+        """
         run_sync(self._skin.clear_faults())
 
     def fault_log(self) -> list[Fault]:
@@ -207,7 +210,7 @@ class Skin:
         return run_sync(self._skin.fault_log())
 
     def acknowledge(self, fault: Fault | int) -> None:
-        """Acknowledge faults up to this entry of `fault_log`, or its id; what has come since stays."""
+        """Acknowledge faults up to this entry of `fault_log`, or its id; what has come since stays. Waits as `clear_faults`."""
         run_sync(self._skin.acknowledge(fault))
 
     def settings(self) -> dict[str, Setting]:

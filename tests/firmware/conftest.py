@@ -139,6 +139,14 @@ class Rig:
         answer = self.ask("SHOW", (over_ms,), [(height,) for height in heights])
         assert answer.id == codec.BY_NAME["SHOW_REPLY"].id
 
+    def clear(self):
+        """Ask for CLEAR and wait until what it acknowledges has been isolated for long enough."""
+        self.tick(self.isolation_ticks(self.ask("CLEAR")))
+
+    def isolation_ticks(self, answer):
+        """How many more ticks what CLEAR or FAULTS_ACK acknowledges stays isolated, by their answer."""
+        return -(-answer["isolated_ms"] * 1000 // self.board.TICK_US)
+
     def state(self):
         """STATE's columns."""
         return self.ask("STATE").columns

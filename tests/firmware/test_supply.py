@@ -54,8 +54,7 @@ def test_a_dip_is_no_loss(rig):
 def test_an_empty_reservoir_has_time_to_fill_at_boot_and_after_clear(rig):
     low(rig, 0)
     assert seconds(rig, ticks_until_lost(rig, 4000)) == pytest.approx(5.0, abs=0.1)
-    rig.ask("CLEAR")
-    rig.tick()
+    rig.clear()
     assert not rig.app.faults.board & faults.SUPPLY_LOST
     assert seconds(rig, ticks_until_lost(rig, 4000)) == pytest.approx(5.0, abs=0.1)
 

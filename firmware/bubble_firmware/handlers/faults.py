@@ -5,6 +5,7 @@ from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from types import ModuleType
 
     from bubble_firmware.board_state import BoardState
     from bubble_firmware.commands import Commands
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 # [constants] message FAULTS_READ as ASKED: AFTER
 # [constants] message FAULTS_READ_REPLY as READ: *
 # [constants] message FAULTS_ACK as ACK: UP_TO
+# [constants] message FAULTS_ACK_REPLY as DONE: *
 _CLEAR = const(13)
 _FAULTS_ACK = const(19)
 _FAULTS_READ = const(18)
@@ -33,6 +35,8 @@ _READ_BUBBLE = const(6)
 _READ_VALUE = const(7)
 _READ_STRIDE = const(5)
 _ACK_UP_TO = const(0)
+_DONE_TICKS = const(0)
+_DONE_ISOLATED_MS = const(1)
 # [end of constants]
 
 _ENTRIES_PER_MESSAGE = const(8)
@@ -43,10 +47,11 @@ class FaultHandlers(Handlers):
 
     capabilities = _SAFETY
 
-    def __init__(self, reply: "Reply", state: "BoardState", commands: "Commands"):
+    def __init__(self, reply: "Reply", board: "ModuleType", state: "BoardState", commands: "Commands"):
         self._reply = reply
+        self._tick_us = board.TICK_US
         self._clock = state.clock
-        self._log = state.faults.log
+        self._faults = state.faults
         self._commands = commands
 
     def requests(self) -> "dict[int, Callable[[int], None]]":
@@ -54,7 +59,7 @@ class FaultHandlers(Handlers):
         return {_FAULTS_READ: self._read, _FAULTS_ACK: self._acknowledge, _CLEAR: self._clear}
 
     def _read(self, count: int) -> None:
-        log = self._log
+        log = self._faults.log
         values = self._reply.values
         number = log.oldest_after(values[_ASKED_AFTER])
         values[_READ_TICKS] = self._clock.ticks
@@ -72,9 +77,14 @@ class FaultHandlers(Handlers):
         self._reply.reply(found)
 
     def _acknowledge(self, count: int) -> None:
-        self._commands.acknowledge(self._reply.values[_ACK_UP_TO])
-        self._reply.acknowledge()
+        self._acknowledge_up_to(self._reply.values[_ACK_UP_TO])
 
     def _clear(self, count: int) -> None:
-        self._commands.acknowledge(self._log.newest)
-        self._reply.acknowledge()
+        self._acknowledge_up_to(self._faults.log.newest)
+
+    def _acknowledge_up_to(self, entry: int) -> None:
+        self._commands.acknowledge(entry)
+        values = self._reply.values
+        values[_DONE_TICKS] = self._clock.ticks
+        values[_DONE_ISOLATED_MS] = -(-self._faults.waiting * self._tick_us // 1000)
+        self._reply.reply(0)

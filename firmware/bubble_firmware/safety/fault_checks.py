@@ -1,9 +1,9 @@
 # mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """Watches every bubble for what control cannot mend, and for how long it has been under pressure.
 
-`FaultMonitor.check` runs the three checks in every tick after `Bubbles.step`, on the same rows. They set the fault bits that
-make control isolate a bubble from the next tick on. What they go by, with thresholds and measured times, is in
-docs/safety.md:
+`FaultMonitor.check` runs the three checks in every tick after `Bubbles.step`, on the same rows. They set fault bits, and a
+bubble that has one is isolated in the same tick, whatever control has decided. What they go by, with thresholds and measured
+times, is in docs/safety.md:
 
 1. pressures: a *sensor* has noise, so one that always says the same is not read; the *budget* of pressure and time; and
    a *vented* line must lose its pressure.
@@ -88,6 +88,7 @@ _BUDGET_FREE_PA = const(6)
 _BUDGET_MAX = const(7)
 _SETTLE_TICKS = const(-2)
 _MOVING = const(1)
+_FAULT = const(4)
 _LEAK = const(8)
 _NO_AIR = const(16)
 _VALVE_STUCK = const(32)
@@ -250,15 +251,15 @@ def check_air(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32):
 
 
 @micropython.viper
-def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> int:
+def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: ptr16) -> int:
     """Flow through open valves and pressure of closed lines of all bubbles; then what the next tick compares with.
 
-    Last, so it lets control look at every bubble with a fault in the next tick, and says whether one of them is new.
+    Last, so it isolates every bubble with a fault in the `pulses` of this tick, and says whether one of them is new.
     """
     found = 0
     tick = board[_TICK_US]
-    n = board[_BUBBLE_COUNT]
-    while n > 0:
+    i = 0
+    while i < board[_BUBBLE_COUNT]:
         pressure = row[_PRESSURE]
         faults = row[_FAULTS]
         if watch[_PREVIOUS_STATUS] & 3 and row[_LOST_TICKS] == 0:
@@ -306,6 +307,16 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> int:
                 else:
                     watch[_CLOSED_OFF_TICKS] = 0
 
+        if faults:
+            row[_FAULTS] = faults
+            row[_STATUS] = _FAULT
+            row[_QUIESCENT] = 0  # control is to look at it in the next tick
+            row[_HOLD_OUTPUT] = 0
+            row[_AIR_QUEUED] = 0
+            row[_FILL_US] = 0
+            row[_VENT_US] = tick
+            pulses[2 * i] = 0
+            pulses[2 * i + 1] = tick
         watch[_PREVIOUS_AIR] = row[_AIR]
         if watch[_PREVIOUS_STATUS] != row[_STATUS]:
             watch[_PREVIOUS_STATUS] = row[_STATUS]
@@ -323,14 +334,10 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> int:
         watch[_PREVIOUS_FLOW] = row[_FLOW]
         watch[_PREVIOUS_FILL_US] = row[_FILL_US]
         watch[_PREVIOUS_VENT_US] = row[_VENT_US]
-        if faults:
-            row[_FAULTS] = faults
-            row[_QUIESCENT] = 0  # control is to look at it in the next tick
-            row[_HOLD_OUTPUT] = 0
         watch[_LOGGED_FAULTS] = watch[_LOGGED_FAULTS] & faults
         if watch[_LOGGED_FAULTS] != faults:
             found = _NEW_FAULT
-        n -= 1
+        i += 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         watch = ptr32(uint(watch) + 4 * _WATCH_WORDS)
     return found
@@ -348,5 +355,21 @@ def block_backflow(row: ptr32, pulses: ptr16, supply: int, n: int):
             row[_INTEGRAL] = 0
             row[_QUIESCENT] = 0
             row[_HOLD_OUTPUT] = 0
+        i += 1
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)
+
+
+@micropython.viper
+def open_vents(row: ptr32, pulses: ptr16, tick: int, n: int):
+    """Close every fill valve and open every vent valve in the period that `pulses` are of."""
+    i = 0
+    while i < n:
+        row[_QUIESCENT] = 0
+        row[_HOLD_OUTPUT] = 0
+        row[_AIR_QUEUED] = 0
+        row[_FILL_US] = 0
+        row[_VENT_US] = tick
+        pulses[2 * i] = 0
+        pulses[2 * i + 1] = tick
         i += 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)

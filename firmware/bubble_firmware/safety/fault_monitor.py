@@ -59,7 +59,13 @@ class FaultMonitor:
             self._watch[at + _CLOSED_TICKS] = _SETTLE_TICKS
 
         # Defaults are locals, see `Bubbles`.
-        work = (bubbles.state, fault_checks.check_pressures, fault_checks.check_air, fault_checks.check_lines)
+        work = (
+            bubbles.state,
+            fault_checks.check_pressures,
+            fault_checks.check_air,
+            fault_checks.check_lines,
+            bubbles.pulses,
+        )
 
         def check(
             rows: memoryview = bubbles.rows,
@@ -69,7 +75,7 @@ class FaultMonitor:
         ) -> int:
             found = work[1](rows, watch, limits, work[0])
             work[2](rows, watch, limits, work[0])
-            return found | work[3](rows, watch, limits, work[0])
+            return found | work[3](rows, watch, limits, work[0], work[4])
 
         self.check = check
 
@@ -82,6 +88,11 @@ class FaultMonitor:
         if supply_pa < self._supply_enough_pa:
             bubbles = self._bubbles
             fault_checks.block_backflow(bubbles.rows, bubbles.pulses, supply_pa, self._count)
+
+    def open_vents(self) -> None:
+        """After `check`: whatever has been decided for this tick, every fill valve is closed and every vent valve open."""
+        bubbles = self._bubbles
+        fault_checks.open_vents(bubbles.rows, bubbles.pulses, self._tick_us, self._count)
 
     def take_new_faults(self, bubble: int) -> int:
         """The fault bits of a bubble that are new since the last time."""

@@ -73,12 +73,12 @@ class SelfTest:
                 self._next(_WAIT)
         elif stage == _WAIT:
             if supply.pressure_pa >= _SUPPLY_PA:
-                self._apply_pulse(bubbles.pulses, self._pulse_us)
+                self._apply_pulse(bubbles, self._pulse_us)
                 self._next(_HOLD)
             elif self._time >= _WAIT_US:
                 self._end(SKIPPED)
         elif stage == _HOLD:
-            self._apply_pulse(bubbles.pulses, 0)
+            self._apply_pulse(bubbles, 0)
             if self._time >= _HOLD_US:
                 self.unfilled = self._take_rise(bubbles)
                 self._next(_RELEASE)
@@ -96,11 +96,12 @@ class SelfTest:
         ill = self.untrue_zero | self.unfilled | self.unvented
         self.outcome = FAILED if ill else outcome
 
-    def _apply_pulse(self, pulses: "array[int]", fill_us: int) -> None:
-        for index in range(0, len(pulses), 2):
-            if not self.untrue_zero >> (index >> 1) & 1:  # no air where nobody sees it
-                pulses[index] = fill_us
-                pulses[index + 1] = 0
+    def _apply_pulse(self, bubbles: "Bubbles", fill_us: int) -> None:
+        pulses = bubbles.pulses
+        for i in range(bubbles.count):
+            if not (self.untrue_zero >> i & 1 or bubbles.faults(i)):  # no air where nobody sees it
+                pulses[2 * i] = fill_us
+                pulses[2 * i + 1] = 0
 
     def _take_zeros(self, bubbles: "Bubbles") -> int:
         ill = 0

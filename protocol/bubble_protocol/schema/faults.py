@@ -53,3 +53,6 @@ EVENTS = (
     ),
 )
 BOARD = 255  # in place of a bubble's number
+
+# What has a fault stays isolated for at least so long, ms, however early it is acknowledged: twice what empties a full bubble.
+ISOLATION_MS = 1000

@@ -60,6 +60,14 @@ ERROR = const(0x7F)
 
 
 _TICKS = ("ticks", U32, "ticks", None, None, "device time: ticks since boot")
+_ISOLATED_MS = (
+    "isolated_ms",
+    U16,
+    "ms",
+    None,
+    None,
+    "how long something acknowledged stays isolated, see `ISOLATION_MS`",
+)
 _BUBBLES = (
     ("height_um", U16, "µm", None, None, "estimated height"),
     ("pressure_pa", I32, "Pa", None, None, "gauge pressure at the sensor"),
@@ -267,8 +275,8 @@ MESSAGES = (
     (STOP | REPLY, "STOP_REPLY", (_TICKS,), (), "stopped"),
     (VENT, "VENT", (), (), "open all vent valves until the next SHOW"),
     (VENT | REPLY, "VENT_REPLY", (_TICKS,), (), "venting"),
-    (CLEAR, "CLEAR", (), (), "forget all faults; bubbles that still have one fault again"),
-    (CLEAR | REPLY, "CLEAR_REPLY", (_TICKS,), (), "faults cleared"),
+    (CLEAR, "CLEAR", (), (), "acknowledge all faults; bubbles that still have one fault again"),
+    (CLEAR | REPLY, "CLEAR_REPLY", (_TICKS, _ISOLATED_MS), (), "acknowledged"),
     (TICKS, "TICKS", (), (), "how long do ticks take, how late do they begin?"),
     (
         TICKS | REPLY,
@@ -468,9 +476,9 @@ MESSAGES = (
         "FAULTS_ACK",
         (("up_to", I32, "", 0, 0x3FFFFFFF, "id of the newest entry that has been seen"),),
         (),
-        "acknowledge: forget the faults up to this entry; those that still are there fault again",
+        "acknowledge the faults up to this entry; those that still are there fault again",
     ),
-    (FAULTS_ACK | REPLY, "FAULTS_ACK_REPLY", (_TICKS,), (), "acknowledged"),
+    (FAULTS_ACK | REPLY, "FAULTS_ACK_REPLY", (_TICKS, _ISOLATED_MS), (), "acknowledged"),
     (SETTING_READ, "SETTING_READ", (), (), "what is set?"),
     (
         SETTING_READ | REPLY,
