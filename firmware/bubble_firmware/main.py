@@ -14,13 +14,20 @@ _COLLECT = 16384  # bytes between two collections while there are imports
 
 def lockstep(board: "ModuleType", boot_id: int) -> None:
     """Run the firmware of `board` against a plant at the other end of stdin and stdout."""
+    spare: "bytearray | None" = bytearray(_SPARE)
     from bubble_firmware.app import App, run
     from bubble_firmware.hal.lockstep import LockstepHal
 
+    gc.threshold(-1)
     hal = LockstepHal(board, boot_id)
     while not hal.ended:
-        run(App(board, hal))
+        app = App(board, hal)
+        spare = None
         gc.collect()
+        run(app)
+        del app
+        gc.collect()
+        spare = bytearray(_SPARE)
 
 
 def pico(board: "ModuleType") -> None:

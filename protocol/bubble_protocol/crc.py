@@ -2,8 +2,8 @@
 """CRC-32 (IEEE 802.3, as in zlib) written straight into a buffer.
 
 MicroPython's `binascii.crc32` returns a long integer for three values in four, and a long integer is an
-allocation. The tick must not allocate, so the device runs this instead; the host passes a function of
-the same shape that calls crcmod. The tests hold crcmod, zlib, binascii and this against each other.
+allocation. The tick must not allocate, so the device runs this instead; the host calls crcmod. The
+tests hold crcmod, zlib, binascii and this against each other.
 On CPython, where a loop over bytes is slow, the same functions are zlib's.
 """
 

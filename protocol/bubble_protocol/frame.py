@@ -11,7 +11,7 @@ Nine bytes around a payload. The content (id to CRC) is at most 254 bytes, so a 
 and both directions work in place and touch only the zeros (Cheshire and Baker, 1999).
 
 Nothing here allocates once made, reads a clock or does I/O. `crc32_into(buffer, start, end, out, at)` is
-the caller's: crcmod on the host, `bubble_protocol.crc` on the device.
+the caller's, such as that of `bubble_protocol.crc`.
 """
 
 from bubble_protocol.buffers import copy

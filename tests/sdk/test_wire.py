@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from bubble_protocol import codec
+from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import FRAME_MAX, Decoder, finish_frame, put_header
 from bubble_protocol.schema import errors, faults, messages, modes, self_test, sequences, store
 from bubbleskin.device.health import Health
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State
-from bubbleskin.link.message import SCHEMA_CRC, crc32_into, encode
+from bubbleskin.link.message import SCHEMA_CRC, encode
 from bubbleskin.link.reader import Reader
 from bubbleskin.link.refusals import describe_refusal
 

@@ -8,8 +8,8 @@ import numpy as np
 from bubble_protocol.schema import messages
 from bubbleskin.device.info import Info
 from bubbleskin.errors import DeviceRefused, InvalidInput
+from bubbleskin.link.framing import crc32
 from bubbleskin.link.link import Call, Link
-from bubbleskin.link.message import crc32
 from bubbleskin.link.upload import upload as send
 
 if TYPE_CHECKING:  # the membrane loads scipy, for which a script that only shows heights need not wait

@@ -9,7 +9,8 @@ from bubble_protocol.schema.errors import OVERTAKEN
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.errors import WrongDevice
 from bubbleskin.link import errors
-from bubbleskin.link.message import Message, crc32, encode, session_key
+from bubbleskin.link.framing import crc32
+from bubbleskin.link.message import Message, encode, session_key
 
 _log = logging.getLogger(__name__)
 

@@ -6,31 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
-import crcmod.predefined
 import numpy as np
 from numpy.typing import NDArray
 
 from bubble_protocol import codec
-from bubble_protocol.frame import FRAME_MAX, NO_KEY, Decoder, finish_frame, put_header
+from bubble_protocol.frame import FRAME_MAX, NO_KEY
+from bubbleskin.link.framing import crc32, enclose
 from bubbleskin.link.struct_codec import BY_NAME
-
-_crc32 = crcmod.predefined.mkPredefinedCrcFun("crc-32")
-
-
-def crc32(data: bytes | bytearray | memoryview) -> int:
-    """CRC-32 as in zlib, by crcmod."""
-    return _crc32(data)
-
-
-def crc32_into(buffer: bytearray, start: int, end: int, out: bytearray, at: int) -> None:
-    """Write the CRC-32 of `buffer[start:end]` to `out[at:at + 4]`: what `bubble_protocol.frame` wants of a host."""
-    out[at : at + 4] = _crc32(memoryview(buffer)[start:end]).to_bytes(4, "little")
-
 
 SCHEMA_CRC = crc32(codec.schema_bytes())
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Message:
     """One message: its fixed fields by name, its repeated fields as columns by name."""
 
@@ -65,15 +52,15 @@ def encode(
 ) -> bytes:
     """The frame of one message: `fixed` fields in the schema's order, `repeated` rows likewise; `key` of `session_key`."""
     struct_codec = BY_NAME[name]
-    message = struct_codec.message
-    frame = bytearray(FRAME_MAX)
     try:
-        end = struct_codec.pack(frame, Decoder.PAYLOAD_AT, fixed, repeated)
+        content = struct_codec.pack(sequence, fixed, repeated)
     except struct.error:  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
+        message = struct_codec.message
         values = array("i", map(signed_word, chain(fixed, *repeated)))
-        end = message.pack(values, len(repeated), frame, Decoder.PAYLOAD_AT)
-    put_header(frame, message.id, sequence)
-    return bytes(frame[: finish_frame(frame, end - 1, crc32_into, key)])
+        payload = bytearray(FRAME_MAX)
+        end = message.pack(values, len(repeated), payload, 0)
+        content = struct.pack("<BH", message.id, sequence & 0xFFFF) + payload[:end]
+    return enclose(content, key)
 
 
 def signed_word(value: int) -> int:

@@ -5,13 +5,14 @@ what the device runs: a test holds both against each other for every message.
 """
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bubble_protocol import codec
+from bubble_protocol.frame import HEADER
 from bubble_protocol.schema import messages
 
 _LETTERS = {
@@ -26,7 +27,7 @@ _LETTERS = {
 class Columns(Mapping[str, NDArray[np.int64]]):
     """The repeated fields by name, made when they are asked for."""
 
-    def __init__(self, data: bytes, row: np.dtype[np.void]):
+    def __init__(self, data: bytearray, row: np.dtype[np.void]):
         self._data = data
         self._row = row
 
@@ -54,30 +55,40 @@ class StructCodec:
         self._texts = tuple(field[0] for field in message.fixed if field[1] == messages.TEXT)
         self._fixed = "".join("16B" if field[1] == messages.TEXT else _LETTERS[field[1]] for field in message.fixed)
         self._group = "".join(_LETTERS[field[1]] for field in message.repeated)
-        self._unpack = struct.Struct("<" + self._fixed.replace("16B", "16s"))
-        self._formats: dict[int, struct.Struct] = {}
+        self._unpack = struct.Struct("<" + self._fixed.replace("16B", "16s")).unpack_from
+        self._packs: dict[int, Callable[..., bytes]] = {}
         self._row = np.dtype([(field[0], f"<{_LETTERS[field[1]]}") for field in message.repeated])
 
-    def pack(self, frame: bytearray, at: int, fixed: Sequence[int], repeated: Sequence[Sequence[int]]) -> int:
-        """Write a payload to `frame[at:]`; returns the index after it. `struct.error` for a number that has no room."""
+    def pack(self, sequence: int, fixed: Sequence[int], repeated: Sequence[Sequence[int]]) -> bytes:
+        """Id, sequence number and payload. `struct.error` for a number that has no room."""
         count = len(repeated)
-        form = self._formats.get(count)
-        if form is None:
-            form = self._formats[count] = struct.Struct("<" + self._fixed + self._group * count)
-        form.pack_into(frame, at, *fixed, *chain.from_iterable(repeated))
-        return at + form.size
+        pack = self._packs.get(count)
+        if pack is None:
+            pack = self._packs[count] = struct.Struct("<BH" + self._fixed + self._group * count).pack
+        if count:
+            return pack(self.message.id, sequence, *fixed, *chain.from_iterable(repeated))
+        return pack(self.message.id, sequence, *fixed)
 
     def unpack(
-        self, frame: bytearray, at: int, count: int
-    ) -> tuple[dict[str, int | str], Mapping[str, NDArray[np.int64]]]:
-        """Fields by name, and columns by name: (count,) each."""
-        fields = dict(zip(self._names, self._unpack.unpack_from(frame, at), strict=True))
+        self, content: bytearray, size: int
+    ) -> tuple[dict[str, int | str], Mapping[str, NDArray[np.int64]]] | None:
+        """Fields by name, and columns by name: (count,) each. None where no payload of this message has `size` bytes.
+
+        `content` begins with id and sequence number. Fields that older firmware does not send are 0, and those that
+        newer firmware has appended are passed over.
+        """
+        message = self.message
+        count = message.count(size)
+        if count < 0:
+            return None
+        if size < message.fixed_size:
+            content = content[: HEADER + size].ljust(HEADER + message.fixed_size, b"\0")
+        fields = dict(zip(self._names, self._unpack(content, HEADER), strict=True))
         for name in self._texts:
             fields[name] = fields[name].rstrip(b"\0").decode("ascii", "replace")
         if not self._group:
             return fields, {}
-        start = at + self._unpack.size
-        return fields, Columns(bytes(frame[start : start + count * self._row.itemsize]), self._row)
+        return fields, Columns(content[HEADER + message.fixed_size : HEADER + size], self._row)
 
 
 BY_ID = {message_id: StructCodec(message) for message_id, message in codec.BY_ID.items()}

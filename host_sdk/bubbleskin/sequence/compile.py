@@ -11,7 +11,7 @@ from bubble_protocol import steps as wire
 from bubbleskin.device.info import Info
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.link.message import crc32
+from bubbleskin.link.framing import crc32
 from bubbleskin.sequence.model import Sequence
 from bubbleskin.sequence.steps import EASINGS, THEN, After, Repeat, Step
 

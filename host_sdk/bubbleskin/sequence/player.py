@@ -11,8 +11,8 @@ from bubbleskin.device.state import State, bubbles_of
 from bubbleskin.errors import DeviceFault, DeviceRefused, InvalidInput
 from bubbleskin.fault_guide import remedies
 from bubbleskin.layout import Layout
+from bubbleskin.link.framing import crc32
 from bubbleskin.link.link import Link
-from bubbleskin.link.message import crc32
 from bubbleskin.sequence.compile import Compiled
 from bubbleskin.sequence.event_log import REASONS, EventLog
 from bubbleskin.sequence.model import Playable, playable
