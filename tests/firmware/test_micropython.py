@@ -68,6 +68,20 @@ def test_it_imports_only_what_is_there(path):
         assert not LACKING & set(names)
 
 
+def test_no_tick_collects_in_lockstep_either(micropython):
+    said = micropython(
+        """
+        import gc
+        from bubble_firmware.boards import wristband7
+        from bubble_firmware.main import lockstep
+
+        lockstep(wristband7, 1)  # which ends with its input
+        print(gc.threshold())
+        """
+    )
+    assert said.split() == ["-1"]
+
+
 def test_everything_imports_in_the_real_micropython(micropython):
     modules = [
         ".".join(path.relative_to(folder.parent).with_suffix("").parts)

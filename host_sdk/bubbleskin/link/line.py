@@ -60,20 +60,21 @@ class Line:
 
         Both are asked once it is this task's turn to read.
         """
+        if not self._event_loop:  # no other task has a turn that could have to be waited for
+            self._receive_in_place(max(timeout(), 0.0))
+            return
         async with self._reading:
             if done():
                 return
-            seconds = max(timeout(), 0.0)
+            seconds = min(max(timeout(), 0.0), SLICE)
             try:
                 if self.lost:
-                    await self._pause(min(seconds, SLICE))
-                elif not self._event_loop:
-                    self._take(self.transport.read(seconds))
-                elif not self.transport.blocks:
-                    self._take(self.transport.read(min(seconds, SLICE)))
-                    await asyncio.sleep(0)
+                    await asyncio.sleep(seconds)
+                elif self.transport.blocks:
+                    await self._receive_beside(seconds)
                 else:
-                    await self._receive_beside(min(seconds, SLICE))
+                    self._take(self.transport.read(seconds))
+                    await asyncio.sleep(0)
             except LinkError as problem:
                 self._lose(problem)
 
@@ -93,11 +94,14 @@ class Line:
         if take := self._taker():
             take(data)
 
-    async def _pause(self, seconds: float) -> None:
-        if self._event_loop:
-            await asyncio.sleep(seconds)
-        else:
-            time.sleep(seconds)
+    def _receive_in_place(self, seconds: float) -> None:
+        if self.lost:
+            time.sleep(min(seconds, SLICE))
+            return
+        try:
+            self._take(self.transport.read(seconds))
+        except LinkError as problem:
+            self._lose(problem)
 
     async def _receive_beside(self, timeout: float) -> None:
         # A cancelled wait must not lose what the thread is about to read: it goes on, and takes it.

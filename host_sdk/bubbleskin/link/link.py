@@ -118,11 +118,11 @@ class Link(Serviced):
             try:
                 for request in requests:
                     self.window.submit(request)
-                while open_ones := [request for request in requests if not request.done]:
-                    if self.transport.now() >= deadline:
-                        break
-                    await self._ready(open_ones[0])  # again, where another call's silence has ended the session
-                    await self.wait(deadline, lambda: not self.open or all(request.done for request in requests))
+                left = requests[:]
+                while not _all_done(left) and self.transport.now() < deadline:
+                    if not self.open:  # for the first time, or another call's silence has ended the session
+                        await self._ready(left[-1])
+                    await self.wait(deadline, lambda: _all_done(left) or not self.open)
             finally:
                 for request in requests:
                     if not request.done:
@@ -180,7 +180,8 @@ class Link(Serviced):
 
     async def _call_ping(self, request: Request) -> Message:
         """PING has no place among the other requests: it changes nothing and is answered at once."""
-        await self._ready(request)
+        if not self.open:
+            await self._ready(request)
         while (now := self.transport.now()) < request.deadline and self.open:
             self._send_ping(request.fixed[0], now)
             request.sends += 1
@@ -196,11 +197,9 @@ class Link(Serviced):
     # A session.
 
     async def _ready(self, request: Request) -> None:
-        """See to it that a session is open."""
+        """Open a session, unless another task does."""
         if self.closed:
             self.transport.read(0.0)  # says so
-        if self.open:
-            return
         async with self._opening:
             while not self.open and not request.done:
                 try:
@@ -302,10 +301,13 @@ class Link(Serviced):
         self._line.write(data)
 
     def _take(self, data: bytes) -> None:
-        self._heard = self._heard or bool(data)
+        if not data:
+            return
+        self._heard = True
         now = self.transport.now()
+        debug = _log.isEnabledFor(logging.DEBUG)
         for message in self._reader.feed(data):
-            if _log.isEnabledFor(logging.DEBUG):
+            if debug:
                 size = self._reader.frame_size
                 _log.debug("received %s %d, %d bytes", name_of(message.id), message.sequence, size)
             self._ticks.unwrap(message)
@@ -350,6 +352,13 @@ class Link(Serviced):
             self._rtt.update(now - sent_at)
             if self.on_ping:
                 self.on_ping(sent_at, message, now)
+
+
+def _all_done(left: list[Request]) -> bool:
+    """Whether none of these waits for its answer any more; drops those at the end that do not."""
+    while left and left[-1].done:
+        left.pop()
+    return not left
 
 
 def run_sync(coroutine: Coroutine[Any, Any, _T]) -> _T:

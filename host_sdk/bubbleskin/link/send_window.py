@@ -24,7 +24,7 @@ LOST = 3
 """Times that a request is sent before the device is asked whether it still is the same."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class Request:
     """One request, from the call to its answer. All times are in s, on the transport's clock.
 
@@ -124,7 +124,10 @@ class SendWindow:
 
     def due(self) -> float:
         """When the next request is sent again."""
-        return min((request.due for request in self._flight.values()), default=math.inf)
+        soonest = math.inf
+        for request in self._flight.values():
+            soonest = min(soonest, request.due)
+        return soonest
 
     def hurry(self, now: float) -> None:
         """Send everything that is under way again at once, as after a reconnect."""
@@ -138,7 +141,10 @@ class SendWindow:
 
     def expired(self, now: float) -> Request | None:
         """A request that is under way and whose deadline has passed."""
-        return next((request for request in self._flight.values() if request.deadline <= now), None)
+        for request in self._flight.values():
+            if request.deadline <= now:
+                return request
+        return None
 
     def settle(self, message: Message, now: float) -> None:
         """Give a reply or an error to its request; one that nobody waits for is dropped."""

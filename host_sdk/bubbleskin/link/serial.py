@@ -36,6 +36,8 @@ class SerialTransport(Transport):
         self.name = url
         # Each change of an rfc2217 port's timeout is negotiated with its server: it keeps one.
         self._negotiates = url.startswith("rfc2217:")
+        # Whether the bytes of its file are those of the port; spy:// and its like see to what passes.
+        self._plain = "://" not in url or url.startswith("socket://")
         self._port = self._open()
         self._waitable: int | None = None
         self._watch()
@@ -87,7 +89,9 @@ class SerialTransport(Transport):
                 return self._read_polling(timeout)
             if self._waitable is not None:  # each change of a port's timeout costs as much as the whole read
                 ready, _, _ = select.select([self._waitable], [], [], max(timeout, 0.0))
-                return bytes(self._port.read(4096)) if ready else b""
+                if not ready:
+                    return b""
+                return self._take(self._waitable) if self._plain else bytes(self._port.read(4096))
             self._port.timeout = max(timeout, 0.0)
             first = self._port.read(1)
             if not first:
@@ -96,6 +100,16 @@ class SerialTransport(Transport):
             return bytes(first + self._port.read(4096))
         except (serial.SerialException, OSError, TypeError, ValueError) as error:  # the last two: closed under our feet
             raise connection_lost(self.name, error) from None
+
+    def _take(self, descriptor: int) -> bytes:
+        """What has come: pyserial would wait for it once more."""
+        try:
+            data = os.read(descriptor, 4096)
+        except BlockingIOError:  # another program has been faster
+            return b""
+        if not data:
+            raise OSError("the other end has gone")
+        return data
 
     def _read_polling(self, timeout: float) -> bytes:
         until = self.now() + timeout
@@ -107,7 +121,11 @@ class SerialTransport(Transport):
     def write(self, data: bytes) -> None:
         """Send all of `data`."""
         try:
-            self._port.write(data)
+            if self._plain and self._waitable is not None:  # pyserial waits for room even after the last byte
+                with contextlib.suppress(BlockingIOError):
+                    data = data[os.write(self._waitable, data) :]
+            if data:
+                self._port.write(data)
         except serial.SerialTimeoutException:
             raise LinkError(
                 f"{self.name} takes no data. It may hang: unplug it, plug it in and connect again."
