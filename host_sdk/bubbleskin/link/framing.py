@@ -11,8 +11,8 @@ import crcmod.predefined
 from bubble_protocol.frame import CONTENT_MAX, CRC, FRAME_MAX, HEADER
 from bubble_protocol.schema import messages
 
-_ZERO = b"\0"
-_DISTANCES = bytes(range(1, 256)) + _ZERO
+_DELIMITER = b"\0"
+_DISTANCES = bytes(range(1, 256)) + _DELIMITER
 """To the next zero, by the bytes in between."""
 _SHORTEST = 1 + HEADER + CRC
 _ABOUT_HELLO = (messages.HELLO, messages.HELLO | messages.REPLY)
@@ -34,9 +34,9 @@ def enclose(content: bytes, key: bytes) -> bytes:
     if not _is_about_hello(content):
         crc ^= int.from_bytes(key, "little")
     content += crc.to_bytes(CRC, "little")
-    frame = bytearray(_ZERO + content + _ZERO)
+    frame = bytearray(_DELIMITER + content + _DELIMITER)
     at = 0
-    for distance in bytes(map(len, content.split(_ZERO))).translate(_DISTANCES):
+    for distance in bytes(map(len, content.split(_DELIMITER))).translate(_DISTANCES):
         frame[at] = distance
         at += distance
     return bytes(frame)
@@ -76,7 +76,7 @@ class FrameFinder:
 
     def feed(self, data: bytes) -> Iterator[bytearray]:
         """Id, sequence number, payload and CRC of each frame that `data` completes."""
-        pieces = data.split(_ZERO)
+        pieces = data.split(_DELIMITER)
         if self._begun:
             pieces[0] = self._begun + pieces[0]
         self._begun = pieces.pop()[:FRAME_MAX]
