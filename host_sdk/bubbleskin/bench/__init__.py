@@ -13,6 +13,7 @@ BENCHES: dict[str, str] = {
     "simulation": "how fast simulated wristbands run",
     "membrane": "inversions, tables, fits",
     "contact": "shapes of bubbles that touch, and plans",
+    "start": "how soon a simulated board answers, beside `import numpy`",
     "film": "films of sequences, beside an empty figure",
     "codec": "frames, beside pymavlink",
     "link": "round trips over a pseudo-terminal, beside a plain echo",

@@ -16,9 +16,9 @@ the energy and where the springs come from.
 import math
 
 import numpy as np
-from numba import njit
 
 from bubbleskin.membrane import balloon, wall
+from bubbleskin.native import njit
 
 BUBBLE = np.dtype(
     [(name, "f8") for name in ("x", "y", "mu", "c2", "c3", "thickness", "radius", "inner", "outer")] + [("thick", "?")],

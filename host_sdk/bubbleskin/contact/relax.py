@@ -13,11 +13,11 @@ import zlib
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from bubbleskin.contact import energy
 from bubbleskin.contact.energy import curvature, gradient, hessian, membrane
 from bubbleskin.membrane import balloon, wall
+from bubbleskin.native import njit
 
 CONVERGED, STALLED, EXHAUSTED, BURST = range(4)
 """How a relaxation ends: force below tolerance; no step helps; too many steps; a bubble grows without end or closes."""

@@ -7,17 +7,20 @@ springs, pairs, force) as of `bubbleskin.contact.energy`; without contact its ar
 
 import inspect
 import math
-import zlib
+import sys
 from dataclasses import fields
+from functools import cache
+from typing import Any
 
 import numpy as np
-from numba import njit
 
 from bubbleskin.contact import energy
+from bubbleskin.contact.energy import BUBBLE, SPRINGS
 from bubbleskin.contact.energy import mechanics as _mechanics
 from bubbleskin.membrane import balloon
 from bubbleskin.membrane.balloon import ATMOSPHERE
-from bubbleskin.sim import pneumatics
+from bubbleskin.native import load, njit, resolve
+from bubbleskin.sim import parameters, pneumatics
 from bubbleskin.sim.parameters import PlantParameters, Supply
 from bubbleskin.sim.pneumatics import OPEN_LINE
 
@@ -139,50 +142,109 @@ def _step_bubbles(bubbles, contact, source, supply, dumped, t, h):  # type: igno
     return drawn, vented
 
 
-def _compile(stamp: int):  # type: ignore[no-untyped-def]
-    """Compile `advance` and `sense`, which are documented where `Plant` calls them.
-
-    numba's cache looks at this file and at what a function closes over, not at the other files that it
-    calls into. `stamp` stands for those: without it an edited formula would go on running as it was.
-    """
-
-    @njit(cache=True)
-    def advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump):  # type: ignore[no-untyped-def]
-        _ = stamp
-        air, supply = reservoir[0][0], reservoir[1][0]
-        h = dt / substeps
-        _set_windows(bubbles, coils, dt)
-        for k in range(substeps):
-            pumped = _pump_flow(air.pressure - ATMOSPHERE, pump, supply.pump_free_flow, supply.pump_stall)
-            dumped = 0.0
-            if dump:
-                dumped = _orifice_flow(air.pressure, ATMOSPHERE, supply.dump_conductance, supply.critical_ratio)
-            if len(contact[0]):
-                _move_centres(contact, h)
-            drawn, vented = _step_bubbles(bubbles, contact, air.pressure, supply, dumped, k * h, h)
-            air.pressure += supply.polytropic * h * (pumped - drawn) / supply.volume
-            air.pumped += h * pumped
-            air.vented += h * vented
-
-    @njit(cache=True)
-    def sense(bubbles, reservoir, noise, pa_per_count, counts):  # type: ignore[no-untyped-def]
-        _ = stamp
-        state, constants = bubbles
-        for i in range(len(state)):
-            s, p = state[i], constants[i]
-            gauge = (s.node - ATMOSPHERE) * p.sensor_gain + p.sensor_offset + s.sensor_bias
-            counts[i] = _sensor_counts(gauge, p.sensor_noise * noise[i], pa_per_count[0])
-            if s.sensor_stuck > 0.0:
-                counts[i] = s.sensor_stuck
-            if s.sensor_absent > 0.0:
-                counts[i] = 0
-        air, supply = reservoir[0][0], reservoir[1][0]
-        gauge = air.pressure - ATMOSPHERE + supply.sensor_offset
-        counts[-1] = _sensor_counts(gauge, supply.sensor_noise * noise[-1], pa_per_count[1])
-
-    return advance, sense
+@njit
+def _advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump):  # type: ignore[no-untyped-def]
+    air, supply = reservoir[0][0], reservoir[1][0]
+    h = dt / substeps
+    _set_windows(bubbles, coils, dt)
+    for k in range(substeps):
+        pumped = _pump_flow(air.pressure - ATMOSPHERE, pump, supply.pump_free_flow, supply.pump_stall)
+        dumped = 0.0
+        if dump:
+            dumped = _orifice_flow(air.pressure, ATMOSPHERE, supply.dump_conductance, supply.critical_ratio)
+        if len(contact[0]):
+            _move_centres(contact, h)
+        drawn, vented = _step_bubbles(bubbles, contact, air.pressure, supply, dumped, k * h, h)
+        air.pressure += supply.polytropic * h * (pumped - drawn) / supply.volume
+        air.pumped += h * pumped
+        air.vented += h * vented
 
 
-advance, sense = _compile(
-    zlib.crc32((inspect.getsource(balloon) + inspect.getsource(pneumatics) + inspect.getsource(energy)).encode())
-)
+@njit
+def _sense(bubbles, reservoir, noise, pa_per_count, supply_pa_per_count, counts):  # type: ignore[no-untyped-def]
+    state, constants = bubbles
+    for i in range(len(state)):
+        s, p = state[i], constants[i]
+        gauge = (s.node - ATMOSPHERE) * p.sensor_gain + p.sensor_offset + s.sensor_bias
+        counts[i] = _sensor_counts(gauge, p.sensor_noise * noise[i], pa_per_count)
+        if s.sensor_stuck > 0.0:
+            counts[i] = s.sensor_stuck
+        if s.sensor_absent > 0.0:
+            counts[i] = 0
+    air, supply = reservoir[0][0], reservoir[1][0]
+    gauge = air.pressure - ATMOSPHERE + supply.sensor_offset
+    counts[-1] = _sensor_counts(gauge, supply.sensor_noise * noise[-1], supply_pa_per_count)
+
+
+def _entries() -> dict[str, Any]:
+    """`advance` and `sense` for numba, with addresses in place of arrays; `Plant` says what they are given."""
+    import numba
+    from numba import carray, float64, int64, uint16, void
+
+    def array_of(kind: Any) -> Any:
+        return numba.types.CPointer(numba.from_dtype(kind) if isinstance(kind, np.dtype) else kind)
+
+    state, constants, air, supply, necks, springs = map(array_of, (STATE, CONSTANTS, AIR, SUPPLY, BUBBLE, SPRINGS))
+    numbers, whole, words = map(array_of, (float64, int64, uint16))
+    plant = (int64, state, constants, air, supply)
+    resolve(globals())
+
+    @numba.njit(
+        void(
+            *plant,
+            int64,
+            int64,
+            numbers,
+            necks,
+            springs,
+            whole,
+            numbers,
+            numbers,
+            numbers,
+            float64,
+            int64,
+            float64,
+            int64,
+        )
+    )
+    def advance(  # type: ignore[no-untyped-def]
+        n,
+        state,
+        constants,
+        air,
+        supply,
+        m,
+        k,
+        place,
+        necks,
+        springs,
+        pairs,
+        force,
+        fill_on,
+        vent_on,
+        dt,
+        substeps,
+        pump,
+        dump,
+    ):
+        bubbles = carray(state, (n,)), carray(constants, (n,))
+        reservoir = carray(air, (1,)), carray(supply, (1,))
+        where = carray(place, (m, 4)), carray(necks, (m,))
+        contact = (*where, carray(springs, (1,)), carray(pairs, (k, 2)), carray(force, (m, 4)))
+        coils = carray(fill_on, (n,)), carray(vent_on, (n,))
+        _advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump != 0)
+
+    @numba.njit(void(*plant, numbers, float64, float64, words))
+    def sense(n, state, constants, air, supply, noise, pa_per_count, supply_pa_per_count, counts):  # type: ignore[no-untyped-def]
+        bubbles = carray(state, (n,)), carray(constants, (n,))
+        reservoir = carray(air, (1,)), carray(supply, (1,))
+        _sense(bubbles, reservoir, carray(noise, (n + 1,)), pa_per_count, supply_pa_per_count, carray(counts, (n + 1,)))
+
+    return {"advance": advance, "sense": sense}
+
+
+@cache
+def compiled() -> dict[str, Any]:
+    """`advance` and `sense`, which are documented where `Plant` calls them."""
+    modules = [sys.modules[__name__], balloon, pneumatics, energy, parameters]
+    return load("plant", "".join(map(inspect.getsource, modules)).encode(), _entries)

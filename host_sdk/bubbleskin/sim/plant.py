@@ -39,6 +39,12 @@ PA_PER_COUNT = (17.0, 25.0)
 """Of the sensors of bubbles and reservoir."""
 
 
+def _address(array: NDArray[Any]) -> int:
+    if not array.flags.c_contiguous:
+        raise InvalidInput("the plant's arrays must lie in one piece")
+    return array.ctypes.data
+
+
 class Plant:
     """`len(parameters.mu)` bubbles at rest, at atmospheric pressure, on a reservoir at `supply_pa` gauge.
 
@@ -83,14 +89,17 @@ class Plant:
                 self._necks[axis] += np.random.default_rng((seed, ord(axis))).normal(0.0, BARBS, n)
             barbs = np.column_stack([self._necks["x"], self._necks["y"]])
             gap = np.linalg.norm(barbs[:, None] - barbs[None], axis=2)
-            self._pairs = np.argwhere(np.triu(gap < REACH, 1))
+            self._pairs = np.ascontiguousarray(np.argwhere(np.triu(gap < REACH, 1)))
             self._stand()
 
-        # The arrays as the kernel takes them: their content changes, they themselves do not.
-        self._bubbles = (self._state, self._constants)
-        self._reservoir = (self._air, self._supply)
-        self._coils = (self._fill_on, self._vent_on)
-        self._contact = (self._place, self._necks, self._springs, self._pairs, self._force)
+        # Where the arrays are, as the kernel takes them: their content changes, they themselves do not.
+        self._plant = (n, *map(_address, (self._state, self._constants, self._air, self._supply)))
+        contact_arrays = (self._place, self._necks, self._springs, self._pairs, self._force)
+        self._moving = (len(self._place), len(self._pairs), *map(_address, contact_arrays))
+        self._coils = (_address(self._fill_on), _address(self._vent_on))
+        self._read = (_address(self._noise), *PA_PER_COUNT)
+        self._into: tuple[NDArray[np.uint16] | None, int] = (None, 0)  # what `read` filled last, and where that is
+        self._advance, self._sense = kernel.compiled()["advance"], kernel.compiled()["sense"]
 
     def _stand(self) -> None:
         """Put every bubble on its barb, touching the base."""
@@ -112,15 +121,15 @@ class Plant:
         # A hair less than the quotient: 5 ms in steps of 50 µs are 100 steps, whatever the rounding says.
         substeps = max(1, math.ceil(dt / self._substep - 1e-6))
         if dt > 0.0:
-            kernel.advance(
-                self._bubbles, self._reservoir, self._contact, self._coils, float(dt), substeps, float(pump), bool(dump)
-            )
+            self._advance(*self._plant, *self._moving, *self._coils, dt, substeps, pump, dump)
         self.time += dt
 
     def read(self, counts: NDArray[np.uint16]) -> None:
         """Read all sensors into `counts`, (n + 1,): those of the bubbles as of `sense`, the reservoir's last."""
         self._rng.standard_normal(out=self._noise)
-        kernel.sense(self._bubbles, self._reservoir, self._noise, PA_PER_COUNT, counts)
+        if self._into[0] is not counts:
+            self._into = counts, _address(counts)
+        self._sense(*self._plant, *self._read, self._into[1])
 
     def sense(self) -> NDArray[np.uint16]:
         """Read the bubbles' sensors, at the valve nodes: (n,) counts of 17 Pa, 160 at zero gauge."""

@@ -1,26 +1,21 @@
 """Puts compiled code into the viper functions of this process, in place: whoever holds a function has the fast one.
 
-A module's functions are compiled when one of them is called for the first time. What numba makes is kept in the cache
-folder, by what it is made of, so that no unchanged source is compiled twice. Where nothing can be compiled or kept, the
-functions stay the plain Python that they are.
+A module's functions are compiled when one of them is called for the first time, and kept by `bubbleskin.native`, so that no
+unchanged source is compiled twice. Where nothing can be compiled or kept, the functions stay the plain Python that they
+are.
 """
 
 import ctypes
-import hashlib
-import importlib.util
 import os
 import sys
-import tempfile
 import threading
-from collections.abc import Callable
-from importlib.metadata import version
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import CodeType, FunctionType
 from typing import Any
 
-import platformdirs
-
 from bubble_protocol import mpy_compat
+from bubbleskin import native
 from bubbleskin.errors import InvalidInput
 from bubbleskin.sim.jit import translate
 
@@ -31,7 +26,7 @@ _lock = threading.RLock()
 functions_of: dict[str, dict[str, FunctionType]] = {}  # as they are written, by module and name
 _held: dict[str, dict[str, FunctionType]] = {}  # what callers hold
 _plain: dict[tuple[str, str], tuple[CodeType, dict[str, Any] | None]] = {}
-_said: set[str] = set()
+_TRANSLATION = ("translate.py", "memory.py")
 
 
 def enable() -> None:
@@ -63,6 +58,7 @@ def _await(held: FunctionType, function: FunctionType) -> None:
     """Let the first call of this function compile its module."""
     module, name = function.__module__, function.__name__
     written = FunctionType(function.__code__, function.__globals__, name)  # the code is about to be another
+    written.__annotations__ = function.__annotations__
     functions_of.setdefault(module, {})[name] = written
     _held.setdefault(module, {})[name] = held
     _plain[module, name] = held.__code__, held.__kwdefaults__
@@ -83,47 +79,39 @@ def _compile(module: str) -> None:
             if made is None:
                 held.__code__, held.__kwdefaults__ = _plain[module, name]
             else:
-                _fill(held, functions_of[module][name], getattr(made, f"compiled_{name}"))
+                _fill(held, functions_of[module][name], made[name])
 
 
-def _made(module: str, functions: dict[str, FunctionType]) -> ModuleType | None:
-    """The module of compiled functions, or None where there can be none: said once."""
+def _made(module: str, functions: dict[str, FunctionType]) -> dict[str, Callable[..., Any]] | None:
+    """The compiled functions, or None where there can be none: said once."""
+    names = vars(sys.modules[module])
     try:
-        source = translate.compiled_source(functions, vars(sys.modules[module]))
-        return _load(module.rpartition(".")[2], source)
+        return native.load(
+            module.rpartition(".")[2],
+            _made_of(module, names),
+            lambda: _compiled(functions, translate.compiled_source(functions, names)),
+            unkept=False,
+        )
     except (translate.NotViperError, OSError, ImportError, RuntimeError) as problem:
-        _say_once(
-            f"The simulated firmware runs as plain Python, some times slower: {module} cannot be compiled: {problem}."
+        reason = getattr(problem, "strerror", None) or problem  # without names that differ from module to module
+        native.say_once(
+            f"The simulated firmware runs as plain Python, some times slower: nothing can be compiled: {reason}."
         )
         return None
 
 
-def _load(name: str, source: str) -> ModuleType:
-    """The module with this source, from the cache folder; numba keeps there what it makes of it."""
-    memory = Path(translate.__file__).with_name("memory.py").read_bytes()
-    made_of = source.encode() + memory + version("numba").encode() + sys.version.encode()
-    name = f"{name}_{hashlib.sha256(made_of).hexdigest()[:16]}"
-    path = Path(platformdirs.user_cache_dir("bubbleskin")) / "viper" / f"{name}.py"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _say_once("Compiling the firmware for this computer, once: up to 20 s.")
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".new")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(source)
-        Path(temporary).replace(path)  # two processes may do this at once
-    spec = importlib.util.spec_from_file_location(f"bubbleskin_viper_{name}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    sys.modules[made.__name__] = made  # numba finds what it has kept by the name
-    spec.loader.exec_module(made)
-    return made
+def _made_of(module: str, names: Mapping[str, Any]) -> bytes:
+    """What the compiled functions of a module depend on: its source, its constants, and the translation."""
+    files = [Path(sys.modules[module].__file__ or ""), *(Path(__file__).with_name(f) for f in _TRANSLATION)]
+    constants = sorted((name, value) for name, value in names.items() if type(value) is int)
+    return b"".join(file.read_bytes() for file in files) + repr(constants).encode()
 
 
-def _say_once(sentence: str) -> None:
-    if sentence.split(":")[0] not in _said:
-        _said.add(sentence.split(":")[0])
-        print(sentence, file=sys.stderr, flush=True)
+def _compiled(functions: Iterable[str], source: str) -> dict[str, Any]:
+    """numba's functions, of their translated source."""
+    space: dict[str, Any] = {}
+    exec(source, space)
+    return {name: space[f"compiled_{name}"] for name in functions}
 
 
 def _fill(held: FunctionType, function: FunctionType, compiled: Callable[..., Any]) -> None:
@@ -131,9 +119,8 @@ def _fill(held: FunctionType, function: FunctionType, compiled: Callable[..., An
 
     The address of the buffer that each parameter had last is remembered: in a tick they are always the same.
     """
-    tree = translate.parsed(function)
-    places = translate.pointers(tree)
-    names = [argument.arg for argument in tree.args.args]
+    names = function.__code__.co_varnames[: function.__code__.co_argcount]
+    places = [name for name in names if function.__annotations__.get(name) is not int]
     memo: list[Any] = []
     lines, given = [], []
     for name in names:

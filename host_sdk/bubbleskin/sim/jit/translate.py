@@ -197,7 +197,7 @@ def _one(function: FunctionType, names: Mapping[str, object], inner: Mapping[str
     made = ast.fix_missing_locations(Compiled(tree, names, inner).visit(tree))
     made.name = inner[name]
     signature = f"{'int64' if returns else 'void'}({kinds})"
-    return f"@njit({signature}, cache=True)\n{ast.unparse(made)}\n", calls
+    return f"@njit({signature})\n{ast.unparse(made)}\n", calls
 
 
 def checked_code(function: FunctionType) -> CodeType:

@@ -1,0 +1,11 @@
+"""Functions that numba compiles, without waiting for numba where they are compiled already.
+
+`load` keeps native code in the cache folder. `njit` is numba's, but imports it only when a function is called; `resolve` is for
+who uses numba itself.
+"""
+
+from bubbleskin.native.later import njit, resolve
+from bubbleskin.native.said import say_once
+from bubbleskin.native.store import load
+
+__all__ = ["load", "njit", "resolve", "say_once"]
