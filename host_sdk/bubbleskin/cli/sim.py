@@ -19,7 +19,8 @@ from bubbleskin.cli.options import Board, as_json
 def sim(board: str, port: int | None, seed: int, spread: float, micropython: bool, json: bool) -> None:
     """Serve a simulated BOARD, by its name or the path of its file, in real time, until Ctrl-C.
 
-    Any program can open it with pyserial: at the pseudo-terminal or the socket:// URL that is printed.
+    Any program can open it with pyserial: at the pseudo-terminal or the socket:// URL that is printed. One has it at a
+    time; on a TCP port another one is told so, and gets it once the first has gone or said nothing for a second.
     """
     from bubbleskin.sim import open_board
     from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve

@@ -61,6 +61,13 @@ def no_wristband(name: str, patience: float, heard: bool) -> WrongDevice:
     )
 
 
+def turned_away(problem: LinkError, name: str, said: str) -> LinkError:
+    """What is at `name` has ended the connection before a session was open; `said`: the text it gave as a reason."""
+    if not said or isinstance(problem, WrongDevice):
+        return problem
+    return LinkError(f"What is at {name} has ended the connection. It says: {said}")
+
+
 def version(low: int, high: int) -> str:
     """Which side to update when the device speaks protocols `low` to `high`."""
     theirs = f"protocol {low}" if low == high else f"protocols {low} to {high}"

@@ -57,6 +57,8 @@ class FrameFinder:
     def __init__(self, key: bytes):
         self.key = key
         self.bad = 0
+        self.noise = b""
+        """What stood between the last two delimiters that was no frame."""
         self._begun = b""  # of a frame; more than fit means too long
 
     @property
@@ -88,6 +90,7 @@ class FrameFinder:
                 yield content
             else:
                 self.bad += 1
+                self.noise = piece
 
     def _open(self, piece: bytes) -> bytearray | None:
         """What stands in a frame without its delimiter."""

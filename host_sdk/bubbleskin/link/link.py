@@ -63,8 +63,8 @@ class Link(Serviced):
         """A restart that was asked for is not told as one that was not."""
         self.closed = False
         self.open = False
-        # The thread that keeps the link alive between calls must not read or write during one.
-        self.guard: Any = contextlib.nullcontext() if event_loop or not transport.blocks else threading.RLock()
+        # Threads of a script take turns, and the one that keeps the link alive has its own between calls. Tasks need none.
+        self.guard: Any = contextlib.nullcontext() if event_loop else threading.RLock()
         self._event_loop = event_loop
         self._rtt = RttEstimator()
         self.window = SendWindow(self._rtt)
@@ -93,6 +93,8 @@ class Link(Serviced):
                 return await self._open(self.transport.now() + self.timeout)
             except DeviceSilent:
                 raise errors.no_wristband(self.transport.name, self.timeout, self._heard) from None
+            except LinkError as problem:
+                raise errors.turned_away(problem, self.transport.name, self._reader.said) from None
 
     async def call(
         self, name: str, fixed: Sequence[int] = (), repeated: Sequence[Sequence[int]] = (), timeout: float | None = None

@@ -33,6 +33,12 @@ class Reader:
         """Frames dropped: CRC, COBS, length, or a message that this side does not know."""
         return self._frames.bad + self.unknown
 
+    @property
+    def said(self) -> str:
+        """The last text that came instead of a frame; empty where there was none, or it is no text."""
+        text = self._frames.noise.decode("ascii", "replace").strip()
+        return text if text.isprintable() and "\ufffd" not in text else ""
+
     def feed(self, data: bytes) -> Iterator[Message]:
         """The messages completed by `data`."""
         for content in self._frames.feed(data):
