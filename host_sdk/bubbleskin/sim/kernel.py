@@ -35,7 +35,7 @@ FAILURES = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sens
 """What can be made to fail, all 0 when healthy; `Plant.inject` says what the values mean."""
 
 STATE = np.dtype(
-    [(name, "f8") for name in ("stretch", "pressure", "node")]
+    [(name, "f8") for name in ("stretch", "pressure", "node", "membrane")]
     + [(f"{valve}_{name}", "?") for valve in ("fill", "vent") for name in ("energised", "open")]
     + [(f"{valve}_{name}", "f8") for valve in ("fill", "vent") for name in ("since", "start", "stop")]
     + [(name, "f8") for name in FAILURES],
@@ -114,8 +114,7 @@ def _stretch(s, p, load, h):  # type: ignore[no-untyped-def]
     """
     sphere = 4.0 / 3.0 * math.pi * p.radius * p.radius * p.radius
     before = p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
-    membrane = _yeoh_pressure(s.stretch, p.mu, p.c2, p.c3, p.thickness, p.radius) + load
-    stretch = s.stretch + h * (s.pressure - ATMOSPHERE - membrane) / p.viscosity
+    stretch = s.stretch + h * (s.pressure - ATMOSPHERE - s.membrane - load) / p.viscosity
     s.stretch = min(max(stretch, STRETCH_MIN), STRETCH_MAX)
     return before, p.tube_volume + sphere * s.stretch * s.stretch * s.stretch
 
@@ -127,10 +126,15 @@ def _step_bubbles(bubbles, contact, source, supply, dumped, t, h):  # type: igno
     place, force = contact[0], contact[4]
     n = supply.polytropic
     drawn = vented = dumped
+    for i in range(len(state)):  # In a loop of their own: no bubble waits for the one before.
+        s, p = state[i], constants[i]
+        s.membrane = _yeoh_pressure(s.stretch, p.mu, p.c2, p.c3, p.thickness, p.radius)
     for i in range(len(state)):
         s, p = state[i], constants[i]
         fill, vent, tube, lost = _flows(s, p, source, supply.critical_ratio, t, h)
-        load = force[i, 3] / (4.0 * math.pi * place[i, 3] * place[i, 3]) if len(place) else 0.0
+        load = 0.0
+        if len(place) and force[i, 3] != 0.0:
+            load = force[i, 3] / (4.0 * math.pi * place[i, 3] * place[i, 3])
         before, volume = _stretch(s, p, load, h)
         if len(place):
             place[i, 3] = p.radius * s.stretch
