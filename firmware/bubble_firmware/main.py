@@ -35,6 +35,7 @@ def pico(board: "ModuleType") -> None:
     """Run the firmware of `board` on the Raspberry Pi Pico that this is."""
     # A function of many locals has its frame on the heap while it runs. The search for room begins at the heap's start:
     # in a heap that is full it takes every tick the better part of a millisecond. So we keep room free there.
+    gc.collect()  # what starting MicroPython left lies in front
     spare = bytearray(_SPARE)
     # And what imports leave behind must not lie scattered over all of the heap, or no large piece is left.
     gc.threshold(_COLLECT)
@@ -46,4 +47,5 @@ def pico(board: "ModuleType") -> None:
     gc.threshold(-1)  # no tick collects
     app = App(board, hal)
     del spare
+    gc.collect()  # or it would be free only after the first collection, which may never come
     run(app)
