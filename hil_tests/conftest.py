@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 import bubbleskin as bs
 
 TARGETS = ("sim://wristband7?contact=0", "micropython://wristband7?contact=0")
-"""Bubbles that stand alone: these tests are of the firmware, which cannot see that a neighbour lifts a bubble."""
+"""Bubbles that stand alone. Where they touch, heights are those of each by itself: the firmware cannot see that a neighbour
+lifts a bubble."""
 EMULATED_SLOWNESS = 10
 """Times as long as on a real board, at most: guards against hangs are longer by this on an emulated chip."""
 FLAT_KPA = 0.4  # sensor noise is 50 Pa
@@ -76,7 +77,8 @@ def skin(target: str) -> Iterator[bs.Skin]:
 
 @dataclass(frozen=True)
 class Trace:
-    """What was seen: one row per moment. True heights and all pulses on a simulated board, estimates on a real one."""
+    """What was seen: one row per moment. On a simulated board all pulses, and the true heights of each bubble by itself; on
+    a real one what the firmware believes of it."""
 
     time: NDArray[np.float64]
     """s since the watch began, (k,)."""
@@ -107,7 +109,7 @@ def watch(skin: bs.Skin) -> Callable[[float], Trace]:
         ticks = round(seconds / tick) + 1
         heights, on = np.empty((ticks, n)), np.empty((ticks, n, 2))
         for k in range(ticks):
-            heights[k], on[k] = board.height_mm, board.pulses
+            heights[k], on[k] = board.alone_mm, board.pulses
             skin.sleep(tick)
         still_on = np.zeros(on.shape, bool)  # a valve that stays on begins no pulse
         still_on[1:] = on[:-1] >= tick
@@ -125,3 +127,17 @@ def watch(skin: bs.Skin) -> Callable[[float], Trace]:
         raise AssertionError("telemetry has ended")
 
     return lambda seconds: true_heights(skin.simulated, seconds) if skin.simulated else estimates(seconds)
+
+
+@pytest.fixture
+def pressed(skin: bs.Skin) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
+    """`pressed(height_mm)`: which bubbles of a simulated board touch a neighbour there, (n,); on a real one none that we know of."""
+
+    def touching(height_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
+        place, radius = skin.layout.positions_mm, np.asarray(height_mm) / 2
+        pairs = np.linalg.norm(place[:, None] - place, axis=2) < radius[:, None] + radius
+        np.fill_diagonal(pairs, False)
+        has_contact = bool(skin.simulated and len(skin.simulated.plant.position_m))
+        return pairs.any(axis=1) & has_contact
+
+    return touching

@@ -71,7 +71,7 @@ def test_the_device_follows_the_ramp(skin):
         begun = skin.playing().begun if begun is None else begun
         if skin.simulated:
             asked = sequence.targets_at(state.time - begun)
-            assert np.abs(skin.simulated.height_mm - asked).max() < 1.0, "on its way"
+            assert np.abs(skin.simulated.alone_mm - asked).max() < 1.0, "on its way"
     skin.sleep(0.4)
     assert skin.state().height_mm == pytest.approx(shape(skin, 12.0), abs=0.2)
 

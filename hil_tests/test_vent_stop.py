@@ -20,7 +20,7 @@ def test_vent_empties_every_bubble_within_a_second(skin):
         assert set(state.status) == {"resting"}
         assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
         if skin.simulated:
-            assert skin.simulated.height_mm == pytest.approx(skin.info.height_rest_mm, abs=0.1)
+            assert skin.simulated.alone_mm == pytest.approx(skin.info.height_rest_mm, abs=0.1)
             assert (skin.simulated.pulses == (0, skin.info.tick)).all()
         skin.sleep(0.25)
 

@@ -54,6 +54,11 @@ class Simulated(ABC):
         """The true heights, which the firmware can only estimate: each bubble's top above the base plane, mm, (n,)."""
 
     @property
+    def alone_mm(self) -> NDArray[np.float64]:
+        """How high each bubble would truly stand if no neighbour lifted it, mm, (n,): what the firmware can know."""
+        return self.plant.alone_mm
+
+    @property
     @abstractmethod
     def pulses(self) -> NDArray[np.float64]:
         """Seconds for which fill and vent valve of each bubble are open in the period now beginning, (n, 2)."""

@@ -184,6 +184,11 @@ class Plant:
         """Top of each bubble above the base plane in mm, (n,): z + R, which is 2R for one that nobody lifts."""
         if len(self._place):
             return np.asarray(1e3 * (self._place[:, 2] + self._place[:, 3]))
+        return self.alone_mm
+
+    @property
+    def alone_mm(self) -> NDArray[np.float64]:
+        """2R of each bubble in mm, (n,): its height where nobody lifts it."""
         return 2e3 * self.parameters.radius * self._state["stretch"]
 
     @property
