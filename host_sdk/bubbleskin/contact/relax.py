@@ -96,6 +96,37 @@ def inner(a, b):  # type: ignore[no-untyped-def]
     return total
 
 
+# Loops instead of numpy's expressions: what they do when shapes differ, which they never do here, takes 25 s to compile.
+
+
+@njit
+def put(to, factor, a):  # type: ignore[no-untyped-def]
+    """`to` = `factor` `a`, (n, 4) each."""
+    for i in range(len(a)):
+        for k in range(4):
+            to[i, k] = factor * a[i, k]
+
+
+@njit
+def add(to, factor, a):  # type: ignore[no-untyped-def]
+    """`to` += `factor` `a`, (n, 4) each."""
+    for i in range(len(a)):
+        for k in range(4):
+            to[i, k] += factor * a[i, k]
+
+
+@njit
+def largest(a):  # type: ignore[no-untyped-def]
+    """The largest size of an entry of `a`, (n, 4); nan if one is."""
+    most = 0.0
+    for i in range(len(a)):
+        for k in range(4):
+            size = abs(a[i, k])
+            if size > most or size != size:
+                most = size
+    return most
+
+
 @njit
 def to_edge(s, d, radius):  # type: ignore[no-untyped-def]
     """The first τ ≥ 0 at which some bubble's part of s + τ d is `radius` (m) long."""
@@ -135,9 +166,9 @@ def newton_step(g, at, radius, accuracy, s, work):  # type: ignore[no-untyped-de
     """
     r, z, d, Hd = work[0], work[1], work[2], work[3]
     s[:] = 0.0
-    r[:] = -g
+    put(r, -1.0, g)
     precondition(at.inverses, r, z)
-    d[:] = z
+    put(d, 1.0, z)
     rz = inner(r, z)
     goal = accuracy * accuracy * inner(r, r)
     saved = 0.0
@@ -157,17 +188,18 @@ def newton_step(g, at, radius, accuracy, s, work):  # type: ignore[no-untyped-de
         if dHd <= 0.0 and radius == np.inf:
             return saved, True, True
         if dHd <= 0.0 or rd >= edge * dHd:
-            s += edge * d
+            add(s, edge, d)
             return saved + edge * rd - 0.5 * edge * edge * dHd, True, dHd <= 0.0
         alpha = rd / dHd
-        s += alpha * d
-        r -= alpha * Hd
+        add(s, alpha, d)
+        add(r, -alpha, Hd)
         saved += alpha * rd - 0.5 * alpha * alpha * dHd
         if inner(r, r) <= goal:
             break
         precondition(at.inverses, r, z)
         new = inner(r, z)
-        d[:] = z + (new / rz) * d
+        put(d, new / rz, d)
+        add(d, 1.0, z)
         rz = new
     return saved, False, False
 
@@ -175,7 +207,8 @@ def newton_step(g, at, radius, accuracy, s, work):  # type: ignore[no-untyped-de
 @njit
 def _place(state, s, bubbles, trial):  # type: ignore[no-untyped-def]
     """`trial` = `state` + `s`; whether its radii are in the model's range, or one closes or grows without end."""
-    trial[:] = state + s
+    put(trial, 1.0, state)
+    add(trial, 1.0, s)
     closed = False
     for i in range(len(state)):
         bubble = bubbles[i]
@@ -207,7 +240,7 @@ def _relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace): 
     work = np.empty((4, n, 4))
     E = gradient(state, pressure, bubbles, springs, pairs, g)
     trace[0] = E
-    force = np.abs(g).max()
+    force = largest(g)
     first, trust = max(force, tolerance), radius
     ended, unstable, fresh, steps = EXHAUSTED, False, False, 0
     while force > tolerance and steps < limit:
@@ -223,18 +256,19 @@ def _relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace): 
         ratio = -1.0
         if place == _IN_RANGE:
             new_E = gradient(trial, pressure, bubbles, springs, pairs, new_g)
-            new_force = np.abs(new_g).max()
+            new_force = largest(new_g)
             ratio = _merit(E, new_E, saved, force, new_force)
             if ratio > 0.0 and (ratio > 1e-4 or new_force < force):
-                state[:] = trial
-                g[:] = new_g
+                put(state, 1.0, trial)
+                put(g, 1.0, new_g)
                 E, force, fresh = new_E, new_force, False
         trace[steps] = E
         trust = _next_trust(trust, ratio, edge, radius)
         if place == _GROWS or trust < _LEAST_TRUST:
             ended = STALLED if place == _IN_RANGE else BURST
             break
-    trace[steps:] = E
+    for k in range(steps, limit + 1):
+        trace[k] = E
     return CONVERGED if force <= tolerance else ended, force, steps, unstable
 
 
@@ -255,9 +289,10 @@ def _solve(state, pressure, bubbles, springs, pairs, rhs, out, accuracy):  # typ
     work = np.empty((4, n, 4))
     curvature(state, pressure, bubbles, springs, pairs, at.blocks, at.contacts)
     invert(at.blocks, at.inverses)
-    good = True
+    good, g = True, np.empty((n, 4))
     for k in range(len(rhs)):
-        _, edge, _ = newton_step(-rhs[k], at, np.inf, accuracy, out[k], work)
+        put(g, -1.0, rhs[k])
+        _, edge, _ = newton_step(g, at, np.inf, accuracy, out[k], work)
         good = good and not edge
     return good
 
