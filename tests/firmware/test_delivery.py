@@ -6,7 +6,7 @@ import pytest
 
 from bubble_firmware.link import receive_window
 from bubble_protocol import codec
-from bubble_protocol.schema import errors, messages, modes
+from bubble_protocol.schema import errors, messages, modes, system
 from bubbleskin.link.message import encode, session_key
 from bubbleskin.link.reader import Reader
 
@@ -91,7 +91,7 @@ def test_the_numbers_come_round(device):
     assert [number for number, _ in device.said()] == [0xFFFD, 0xFFFE, 0xFFFF, 0, 1, 2, 0xFFFD, 0]
 
 
-@pytest.mark.parametrize("number", [1 + receive_window.WINDOW, 100, 0x8000, 0xFFFF - receive_window.KEPT])
+@pytest.mark.parametrize("number", [1 + receive_window.WINDOW, 100, 0x8000, 0xFFFF - system.REPLIES_KEPT])
 def test_what_is_far_from_its_turn_is_dropped(device, number):
     device.send(show(device, number))
     device.tick(3)
@@ -99,7 +99,7 @@ def test_what_is_far_from_its_turn_is_dropped(device, number):
 
 
 @pytest.mark.parametrize("urgent", ["STOP", "VENT"])
-@pytest.mark.parametrize("ahead", [0, 1, 5, receive_window.KEPT - 1])
+@pytest.mark.parametrize("ahead", [0, 1, 5, system.REPLIES_KEPT - 1])
 def test_stop_and_vent_overtake(device, urgent, ahead):
     device.send(show(device, 1))
     device.tick()

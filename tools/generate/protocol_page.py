@@ -9,7 +9,6 @@ from pathlib import Path
 
 import generated
 
-from bubble_firmware.link import receive_window
 from bubble_protocol import codec, frame, steps, version
 from bubble_protocol.schema import errors, faults, messages, modes, sequences, statuses, store, system, telemetry
 from bubbleskin.link.message import SCHEMA_CRC, encode, session_key
@@ -194,8 +193,8 @@ def page() -> str:
         reply=messages.REPLY,
         ping=encode("PING", 0x0102, (7,), key=session_key(1, 2)).hex(" "),
         key=session_key(1, 2).hex(" "),
-        kept=receive_window.KEPT,
-        ahead=receive_window.KEPT - 1,
+        kept=system.REPLIES_KEPT,
+        ahead=system.REPLIES_KEPT - 1,
         head=steps.HEAD,
         ms=steps.MS_MAX,
         low=steps.TOLERANCE_MIN_UM,

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 WINDOW = const(8)
 """Requests that may be under way at once; as many slots for those that come too early."""
 
-KEPT = const(16)
-"""Replies kept. Twice the window: STOP and VENT may be ahead of a full one."""
+# [constants] bubble_protocol.schema.system: REPLIES_KEPT
+_REPLIES_KEPT = const(16)
+# [end of constants]
 
 _SESSIONS = const(64)  # bytes: the last sixteen sessions
 
@@ -54,8 +55,10 @@ class ReceiveWindow:
         self.key = bytearray(CRC)
         self.expected = 1  # the number whose turn it is, 16 bits
         self.early = 0  # how many requests wait for their turn
-        self.replies = [bytearray(FRAME_MAX) for _ in range(KEPT)]  # of number n in place n modulo KEPT
-        self.lengths = array("H", bytearray(2 * KEPT))  # 0: never answered, overtaken
+        self.replies = [
+            bytearray(FRAME_MAX) for _ in range(_REPLIES_KEPT)
+        ]  # of number n in place n modulo _REPLIES_KEPT
+        self.lengths = array("H", bytearray(2 * _REPLIES_KEPT))  # 0: never answered, overtaken
         self._identity = bytearray(boot_id.to_bytes(4, "little") + NO_KEY)
         self._sessions = bytearray(_SESSIONS)
         self._session_at = 0
@@ -82,7 +85,7 @@ class ReceiveWindow:
         self.early = 0
         for index in range(WINDOW):
             self._sizes[index] = 0
-        for index in range(KEPT):
+        for index in range(_REPLIES_KEPT):
             self.lengths[index] = 0
 
     def advance(self) -> None:
@@ -92,7 +95,7 @@ class ReceiveWindow:
         if self._sizes[slot]:
             self._sizes[slot] = 0
             self.early -= 1
-        self.lengths[expected % KEPT] = 0
+        self.lengths[expected % _REPLIES_KEPT] = 0
         self.expected = (expected + 1) & 0xFFFF
 
     def keep(self, number: int, frame: bytearray, length: int) -> None:

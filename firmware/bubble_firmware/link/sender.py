@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from bubble_firmware.hal.base import Hal
     from bubble_firmware.link.receive_window import ReceiveWindow
 
-# [constants] bubble_firmware.link.receive_window: KEPT
-_KEPT = const(16)
+# [constants] bubble_protocol.schema.system: REPLIES_KEPT
+_REPLIES_KEPT = const(16)
 # [end of constants]
 
 _PAYLOAD_AT = Decoder.PAYLOAD_AT
@@ -40,7 +40,7 @@ class Sender:
     def answer(self, message_id: int, number: int, count: int) -> None:
         """Reply to the request that has just had its turn: the reply is kept, and sent as soon as there is room."""
         window = self._window
-        place = number % _KEPT
+        place = number % _REPLIES_KEPT
         window.lengths[place] = self._pack(window.replies[place], message_id, number, count)
         self.unsent += 1
         self.flush()
@@ -48,7 +48,7 @@ class Sender:
     def repeat(self, number: int) -> bool:
         """Send the reply to a request once more. False where it never had one."""
         window = self._window
-        place = number % _KEPT
+        place = number % _REPLIES_KEPT
         if not window.lengths[place]:
             return False
         self._hal.send(window.replies[place], window.lengths[place])
@@ -57,10 +57,10 @@ class Sender:
     def flush(self) -> None:
         """Send the replies that are unsent, in order, as far as there is room."""
         window = self._window
-        if self.unsent > _KEPT:
-            self.unsent = _KEPT
+        if self.unsent > _REPLIES_KEPT:
+            self.unsent = _REPLIES_KEPT
         while self.unsent:
-            place = (window.expected - self.unsent) % _KEPT
+            place = (window.expected - self.unsent) % _REPLIES_KEPT
             if window.lengths[place] and not self._hal.send(window.replies[place], window.lengths[place]):
                 return
             self.unsent -= 1

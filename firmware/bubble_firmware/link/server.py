@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 # [constants] bubble_protocol.schema.messages: HELLO PING STOP VENT
 # [constants] bubble_protocol.schema.errors: FAULTED NO_ELEMENT OUT_OF_RANGE OVERTAKEN UNKNOWN_MESSAGE WRONG_LENGTH
-# [constants] bubble_firmware.link.receive_window: KEPT OPENED WINDOW
+# [constants] bubble_protocol.schema.system: REPLIES_KEPT
+# [constants] bubble_firmware.link.receive_window: OPENED WINDOW
 _HELLO = const(1)
 _PING = const(2)
 _STOP = const(11)
@@ -35,7 +36,7 @@ _OUT_OF_RANGE = const(3)
 _OVERTAKEN = const(10)
 _UNKNOWN_MESSAGE = const(1)
 _WRONG_LENGTH = const(2)
-_KEPT = const(16)
+_REPLIES_KEPT = const(16)
 _OPENED = const(2)
 _WINDOW = const(8)
 # [end of constants]
@@ -125,9 +126,9 @@ class Server:
             self._handle(message_id, decoder.frame, decoder.length - HEADER)
             return
         ahead = (number - window.expected) & 0xFFFF
-        if ahead >= 0x10000 - _KEPT:
+        if ahead >= 0x10000 - _REPLIES_KEPT:
             self._answer_again(message_id, number)
-        elif ahead < _KEPT and (message_id == _STOP or message_id == _VENT):
+        elif ahead < _REPLIES_KEPT and (message_id == _STOP or message_id == _VENT):
             self._overtake(ahead)
             self._handle_next(decoder.frame, decoder.length)
         elif ahead == 0 and self._budget > 0:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from bubble_protocol import codec
 from bubble_protocol.frame import NO_KEY
-from bubble_protocol.schema import messages
+from bubble_protocol.schema import messages, system
 from bubbleskin.errors import BubbleskinError, Overtaken
 from bubbleskin.link.message import Message, encode
 from bubbleskin.link.rtt import RttEstimator
@@ -18,8 +18,6 @@ _log = logging.getLogger(__name__)
 URGENT = ("STOP", "VENT")
 BYTES = 512
 """Bytes in flight at most, beside one request: a VENT sent now waits no longer than these take to be read."""
-REPLIES_KEPT = 16
-"""Replies that a device keeps: STOP and VENT may be so far ahead of the oldest request without an answer."""
 LOST = 3
 """Times that a request is sent before the device is asked whether it still is the same."""
 
@@ -183,7 +181,7 @@ class SendWindow:
             return True
         ahead = self.next_number - self._oldest().number
         if request.urgent:
-            return ahead < REPLIES_KEPT
+            return ahead < system.REPLIES_KEPT
         return ahead < self.size and sum(len(other.frame) for other in self._flight.values()) < BYTES
 
     def _send(self, request: Request, now: float) -> bytes:
