@@ -131,7 +131,7 @@ def watch(skin: bs.Skin) -> Callable[[float], Trace]:
 
 @pytest.fixture
 def pressed(skin: bs.Skin) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
-    """`pressed(height_mm)`: which bubbles of a simulated board touch a neighbour there, (n,); on a real one none that we know of."""
+    """`pressed(height_mm)`: which bubbles of a simulated board touch a neighbour there, (n,); none of a real one."""
 
     def touching(height_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
         place, radius = skin.layout.positions_mm, np.asarray(height_mm) / 2

@@ -10,7 +10,7 @@ pytestmark = pytest.mark.timeout(240)
 LOW, PLATEAU_LOW, PLATEAU_HIGH, HIGH = 5.5, 7.0, 9.0, 12.5
 NEAR, BEYOND = 0.2, 0.3
 NEAR_PRESSED, BEYOND_PRESSED = 0.3, 0.5
-"""Of bubbles that a neighbour presses, and that one has pressed: its push raises the pressure, which the firmware reads as height."""
+"""Of bubbles that a neighbour presses, or has pressed: its push raises the pressure, and the firmware reads that as height."""
 SOON = 0.6
 STAYS = 10.0
 
