@@ -35,12 +35,13 @@ if TYPE_CHECKING:
 
     from bubble_firmware.hal.base import Hal
 
-# [constants] bubble_protocol.schema.faults: OVERFILLED SELF_TEST
+# [constants] bubble_protocol.schema.faults: OVERFILLED SELF_TEST SHUTTING
 # [constants] bubble_protocol.schema.modes: BOOT IDLE
 # [constants] bubble_firmware.safety.state: NO_EVENT TESTED as EVENT_TESTED
 # [constants] bubble_firmware.safety.watch_layout: NEW_FAULT MOVING_BUBBLE PRESSED_BUBBLE OVERFILLED_BUBBLE
 _OVERFILLED = const(128)
 _SELF_TEST = const(64)
+_SHUTTING = const(130)
 _BOOT = const(3)
 _IDLE = const(0)
 _NO_EVENT = const(-1)
@@ -130,7 +131,7 @@ class App:
 
         # What is there? Counts of all sensors, and faults of the board.
         hal.read_sensors(counts)
-        supply.sense(counts[bubbles.count])
+        supply.sense(counts[bubbles.count], bubbles.pulses, self.faults.board & _SHUTTING)
         if hal.active_faults or supply.lost:
             self.commands.fault(hal.active_faults)
 
@@ -158,7 +159,7 @@ class App:
             self._test()
 
         # Do it.
-        if self.faults.board & _OVERFILLED:  # nothing more into it
+        if self.faults.board & _SHUTTING:  # nothing more into it, from the very tick on that finds it
             hal.write_outputs(bubbles.pulses, 0, 1)
         else:
             hal.write_outputs(bubbles.pulses, supply.pump, supply.dump)

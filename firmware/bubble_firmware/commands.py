@@ -87,7 +87,6 @@ class Commands:
     def release(self) -> None:
         """Let go on what is acknowledged and has been isolated for long enough."""
         if self._faults.release():
-            self._supply.clear()
             self._hal.clear_faults()
             self._safety.handle(_EVENT_CLEAR)
 

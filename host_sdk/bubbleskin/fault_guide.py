@@ -56,8 +56,9 @@ BOARD_GUIDE = {
         "Release the button; if it was not pressed, check the wires of its loop",
     ),
     "supply_lost": Guide(
-        "a pump without current, a leak before the valves, or a dump valve that stays open",
-        "Check the pump's current, the reservoir's tubes and the dump valve",
+        "a pump without current, a leak before the valves, a dump valve that stays open, or a sensor of the reservoir that "
+        "repeats itself, leaps or does not see the pump's work",
+        "Check the pump's current, the reservoir's tubes and the dump valve, then the reservoir's sensor and its wires",
     ),
     "valve_chip": Guide(
         "a loose wire or a missing supply of a valve driver",

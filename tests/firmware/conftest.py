@@ -4,6 +4,7 @@ import struct
 import zlib
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from bubble_firmware import boards
@@ -11,12 +12,13 @@ from bubble_firmware.app import App
 from bubble_firmware.control.state_layout import ROW_WORDS, SETPOINT
 from bubble_firmware.hal.base import Hal
 from bubble_protocol import codec, steps
-from bubble_protocol.schema import messages
+from bubble_protocol.schema import faults, messages, settings
 from bubble_protocol.schema.messages import HELLO, PING
 from bubble_protocol.schema.sequences import SEQUENCE_ENDED, STEP_BEGUN
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.link import message as wire
 from bubbleskin.link.reader import Reader
+from bubbleskin.sim import SimulatedBoard
 
 SESSION = 0x89ABCDEF
 
@@ -37,6 +39,9 @@ class ScriptedHal(Hal):
         self.pump = self.dump = None
         self.safe = False  # whether the outputs are
         self.noise = 0
+        self.noisy = True
+        self.sags = True
+        self.taken = 0
         self.full = False  # no room for what is sent
         self.broken = set()  # names of methods that raise
 
@@ -48,8 +53,11 @@ class ScriptedHal(Hal):
         """A sensor has noise: now and then a count more, where that is none of the ends."""
         self._use("read_sensors")
         self.noise = (self.noise + 1) % 8
-        more = self.noise == 0
+        more = self.noise == 0 and self.noisy
         counts[:] = type(counts)("H", [count + (more and 8 < count < 4000) for count in self.counts])
+        if self.sags and self.pulses and any(self.pulses[::2]):  # what bubbles take shows in the reservoir
+            self.taken = (self.taken + 1) % 16
+            counts[-1] = max(counts[-1] - 10 * self.taken, 9) if counts[-1] > 9 else counts[-1]
 
     def write_outputs(self, pulses, pump, dump):
         self._use("write_outputs")
@@ -154,6 +162,14 @@ class Rig:
     def sense(self, bubble, pascals):
         """What a bubble's sensor reads from now on."""
         self.hal.counts[bubble] = self.board.SENSOR_ZERO + round(pascals / self.board.SENSOR_PA_PER_COUNT)
+
+    def supply(self, pascals):
+        """What the reservoir's sensor reads from now on; it gets there no faster than air flows, tick by tick."""
+        target = self.board.SUPPLY_ZERO + pascals // self.board.SUPPLY_PA_PER_COUNT
+        while abs(target - self.hal.counts[-1]) > 160:
+            self.hal.counts[-1] += 160 if target > self.hal.counts[-1] else -160
+            self.tick()
+        self.hal.counts[-1] = target
 
     def pulse(self, bubble):
         """(fill, vent) of the coming period, µs."""
@@ -304,3 +320,76 @@ def sequencer(rig):
 @pytest.fixture
 def seven(rig7):
     return Sequencer(rig7)
+
+
+class Attacked:
+    """A simulated board whose host clears every `pace` seconds and asks for one shape and another; what became of it."""
+
+    ILL = 2  # the bubble that fails
+    SHOW_TICKS = 130  # between two shapes
+
+    def __init__(self, pace, heights_um, budget=None):
+        self.board = SimulatedBoard(contact=False)
+        self.app = self.board.firmware.app
+        self.key = wire.session_key(self.board.firmware.boot_id, SESSION)
+        self.number = 0
+        self.pace = max(1, round(pace / self.board.tick_s))
+        self.pressure_pa = np.zeros(self.board.data.BUBBLES)  # greatest, true
+        self.height_mm = np.zeros(self.board.data.BUBBLES)
+        self.supply_pa = 0.0
+        self.above_pa_s = self.most_above_pa_s = 0.0
+        self.seen = 0
+        self.isolated = {}  # for how many ticks: of a bubble, and of the board, -1
+        self.board.to_device += wire.encode("HELLO", 0, (PROTOCOL_MIN, PROTOCOL_MAX, SESSION))
+        self.board.tick()
+        if budget:
+            self.send("SETTING_WRITE", (), [(settings.BUDGET_KPA_S, budget)])
+        self.heights_um = heights_um
+        self.show(0)
+        self.run(1.0, attack=False)
+
+    def check_isolation(self):
+        """What has a fault is vented in the tick that finds it, and for long enough."""
+        bubbles, faulty = self.app.bubbles, self.app.faults.board & faults.VENTING
+        self.seen |= bubbles.faults(self.ILL)
+        ill = {bubble for bubble in range(bubbles.count) if bubbles.faults(bubble)} | ({-1} if faulty else set())
+        for bubble in range(bubbles.count):
+            if bubble in ill or faulty:
+                assert tuple(bubbles.pulses[2 * bubble : 2 * bubble + 2]) == (0, self.board.data.TICK_US)
+        for gone in self.isolated.keys() - ill:
+            assert self.isolated.pop(gone) * self.board.data.TICK_US >= faults.ISOLATION_MS * 1000
+        for one in ill:
+            self.isolated[one] = self.isolated.get(one, 0) + 1
+
+    def send(self, name, fixed=(), repeated=()):
+        self.number += 1
+        self.board.to_device += wire.encode(name, self.number, fixed, repeated, self.key)
+
+    def show(self, which):
+        self.send("SHOW", (0,), [(self.heights_um[which],)] * self.board.data.BUBBLES)
+
+    def run(self, seconds, attack=True):
+        board, plant = self.board, self.board.plant
+        for tick in range(round(seconds / board.tick_s)):
+            if not tick % 20:
+                self.send("PING", (0,))
+                self.number -= 1  # PING takes no number
+            if attack and not tick % self.pace:
+                self.send("CLEAR")
+            if attack and not tick % self.SHOW_TICKS:
+                self.show(tick // self.SHOW_TICKS % len(self.heights_um))
+            board.tick()
+            board.from_device.clear()
+            self.check_isolation()
+            self.pressure_pa = np.maximum(self.pressure_pa, plant.pressure_pa)
+            self.height_mm = np.maximum(self.height_mm, plant.height_mm)
+            self.supply_pa = max(self.supply_pa, plant.supply_pa)
+            self.above_pa_s += (plant.pressure_pa[self.ILL] - board.data.BUDGET_FREE_PA) * board.tick_s
+            self.above_pa_s = max(self.above_pa_s, 0.0)
+            self.most_above_pa_s = max(self.most_above_pa_s, self.above_pa_s)
+
+
+@pytest.fixture(scope="session")
+def attack():
+    """Makes attacked boards."""
+    return Attacked

@@ -70,7 +70,8 @@ class Chance:
 def hostile(board, seed, ticks):
     """Counts, and requests as in a trace, that no plant and no SDK would give: leaps over the whole range, any table.
 
-    The first bubbles stay quiet for long, so that what takes its time comes about, too.
+    The first bubbles stay quiet for long, so that what takes its time comes about, too. For two thirds of the time nothing
+    stands that would have the whole board vented: the supply is steady, and the pressures go in between.
     """
     chance = Chance(seed)
     n = board.BUBBLES
@@ -79,13 +80,16 @@ def hostile(board, seed, ticks):
     tables = [[list(knot) for knot in KNOTS] for _ in range(n)]
     level, noise = [board.SENSOR_ZERO] * (n + 1), 1
     for tick in range(ticks):
-        if tick % 30 == 0:
+        calm = tick < 2 * ticks // 3
+        if tick % 20 == 0:
             noise = chance.one_of([0, 1, 5, 60, 600])
             for sensor in range(n + 1):
                 if sensor >= 3 or chance.below(8) == 0:
                     level[sensor] = chance.one_of([0, 160, 1400, 2630, 4095, 0xFFFF, 2000, 2200, chance.below(4096)])
             if chance.below(3):
                 level[n] = 2550
+            if calm and tick % 40:
+                level[:n] = [board.SENSOR_ZERO] * n
         if tick % 150 == 20:
             bubble = chance.below(n)
             heights = sorted({1 + chance.below(13999) for _ in range(1 + chance.below(48))})
@@ -105,6 +109,8 @@ def hostile(board, seed, ticks):
         for sensor in range(n + 1):
             noisy = level[sensor] + chance.below(2 * noise + 1) - noise
             counts[tick, sensor] = level[sensor] if level[sensor] == 0xFFFF else max(0, min(4095, noisy))
+    steady = 2 * ticks // 3
+    counts[:steady, n] = 2550 + np.arange(steady) % 3
     return counts, requests
 
 

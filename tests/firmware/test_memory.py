@@ -27,6 +27,7 @@ class FollowingHal(Hal):
         self.zero = board.SENSOR_ZERO
         self.level = bytearray(2 * self.n)
         self.flow = bytearray(self.n)  # what flows shows in the tube
+        self.supply = 2550  # what is taken shows in the reservoir
         self.requests = requests
         self.at = 0
         self.noise = 1
@@ -43,12 +44,14 @@ class FollowingHal(Hal):
         for i in range(self.n):
             noise = noise * 75 % 65537
             counts[i] = self.zero + (level[2 * i] | level[2 * i + 1] << 8) + (noise & 3) + self.flow[i]
-        counts[self.n] = 2550 + (noise & 15)
+        counts[self.n] = self.supply + (noise & 15)
         self.noise = noise
 
     def write_outputs(self, pulses, pump, dump):
         level = self.level
+        self.supply += pump >> 12
         for i in range(self.n):
+            self.supply -= pulses[2 * i] >> 11
             height = level[2 * i] | level[2 * i + 1] << 8
             fill = pulses[2 * i]
             vent = pulses[2 * i + 1]
@@ -67,6 +70,11 @@ class FollowingHal(Hal):
             self.flow[i] = 0 if vent else 250 if fill else 90
             level[2 * i] = height & 255
             level[2 * i + 1] = height >> 8
+
+        if self.supply > 2550:
+            self.supply = 2550
+        if self.supply < 2200:
+            self.supply = 2200
 
     def safe_outputs(self):
         self.safe += 1

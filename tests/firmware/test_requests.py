@@ -195,7 +195,7 @@ def test_chosen_columns_say_the_same_as_the_state_of_that_tick(rig, fields):
     assert (state.id, sample.id) == (messages.STATE | messages.REPLY, messages.TELEMETRY_FIELDS)
     assert (sample["ticks"], sample["mode"], sample["fields"]) == (state["ticks"], state["mode"], fields)
     assert (sample["dropped"], sample["board_faults"]) == (0, 0)
-    assert abs(sample["supply_pa"] - rig.board.SUPPLY_PA) < 100
+    assert sample["supply_pa"] == rig.app.supply.pressure_pa
     chosen = [column for column in telemetry.COLUMNS if column[0] & fields]
     rows = sample.columns["value"].reshape(rig.board.BUBBLES, len(chosen))
     told = {

@@ -241,8 +241,19 @@ def test_the_sensor_misreads_while_air_flows():
 # --- reservoir ---
 
 
-def test_the_pump_fills_the_reservoir_and_the_dump_valve_empties_it():
+def test_the_relief_valve_holds_what_the_pump_brings_and_lets_nothing_out_below():
     plant = make(supply=Supply(), supply_pa=0.0)
+    run(plant, 20.0, pump=1.0)
+    assert 80e3 < plant.supply_pa < 81e3
+    run(plant, 5.0)
+    assert plant.supply_pa == pytest.approx(80e3, rel=1e-3)
+    plant.inject("relief_stuck", 0)
+    run(plant, 20.0, pump=1.0)
+    assert plant.supply_pa == pytest.approx(120e3, rel=0.01)
+
+
+def test_the_pump_fills_the_reservoir_and_the_dump_valve_empties_it():
+    plant = make(supply=Supply(relief_pressure=np.inf), supply_pa=0.0)
     run(plant, 0.01, pump=1.0)
     # 3 L/min into 50 mL: a bar a second at first.
     assert plant.supply_pa == pytest.approx(101325 * 0.01, rel=0.01)

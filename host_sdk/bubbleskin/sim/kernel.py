@@ -34,6 +34,9 @@ enough not to show, large enough for steps of 50 µs: h k < 2 DRAG even where si
 FAILURES = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sensor_absent", "sensor_bias")
 """What can be made to fail, all 0 when healthy; `Plant.inject` says what the values mean."""
 
+SUPPLY_FAILURES = ("supply_stuck", "supply_flat", "supply_bias", "supply_absent", "relief_stuck")
+"""The same of the reservoir."""
+
 STATE = np.dtype(
     [(name, "f8") for name in ("stretch", "pressure", "node", "membrane")]
     + [(f"{valve}_{name}", "?") for valve in ("fill", "vent") for name in ("energised", "open")]
@@ -41,7 +44,7 @@ STATE = np.dtype(
     + [(name, "f8") for name in FAILURES],
     align=True,
 )
-AIR = np.dtype([(name, "f8") for name in ("pressure", "pumped", "vented")])
+AIR = np.dtype([(name, "f8") for name in ("pressure", "pumped", "vented", *SUPPLY_FAILURES)])
 SUPPLY = np.dtype([(f.name, "f8") for f in fields(Supply)])
 CONSTANTS = np.dtype([(f.name, "f8") for f in fields(PlantParameters) if f.name != "supply"])
 
@@ -154,8 +157,12 @@ def _advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump):  # t
     for k in range(substeps):
         pumped = _pump_flow(air.pressure - ATMOSPHERE, pump, supply.pump_free_flow, supply.pump_stall)
         dumped = 0.0
-        if dump:
-            dumped = _orifice_flow(air.pressure, ATMOSPHERE, supply.dump_conductance, supply.critical_ratio)
+        opening = (air.pressure - ATMOSPHERE - supply.relief_pressure) / supply.relief_range
+        if air.relief_stuck > 0.0:
+            opening = 0.0
+        if dump or opening > 0.0:
+            conductance = supply.dump_conductance * ((1.0 if dump else 0.0) + min(max(opening, 0.0), 1.0))
+            dumped = _orifice_flow(air.pressure, ATMOSPHERE, conductance, supply.critical_ratio)
         if len(contact[0]):
             _move_centres(contact, h)
         drawn, vented = _step_bubbles(bubbles, contact, air.pressure, supply, dumped, k * h, h)
@@ -176,8 +183,14 @@ def _sense(bubbles, reservoir, noise, pa_per_count, supply_pa_per_count, counts)
         if s.sensor_absent > 0.0:
             counts[i] = 0
     air, supply = reservoir[0][0], reservoir[1][0]
-    gauge = air.pressure - ATMOSPHERE + supply.sensor_offset
+    gauge = air.pressure - ATMOSPHERE + supply.sensor_offset + air.supply_bias
+    if air.supply_flat > 0.0:
+        gauge = air.supply_flat
     counts[-1] = _sensor_counts(gauge, supply.sensor_noise * noise[-1], supply_pa_per_count)
+    if air.supply_stuck > 0.0:
+        counts[-1] = air.supply_stuck
+    if air.supply_absent > 0.0:
+        counts[-1] = 0
 
 
 def _entries() -> dict[str, Any]:

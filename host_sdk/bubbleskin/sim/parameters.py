@@ -22,6 +22,10 @@ class Supply:
     """Gauge pressure at which the pump brings nothing, Pa."""
     dump_conductance: float = RESTRICTOR * (1.0 / 0.2) ** 2
     """A 1 mm orifice, m³/(s·Pa)."""
+    relief_pressure: float = 80e3
+    """Gauge pressure at which the relief valve begins to open, Pa; infinite for a reservoir that has none."""
+    relief_range: float = 2e3
+    """Pressure by which it is open as wide as the dump valve, Pa."""
     polytropic: float = 1.0
     """Exponent n of all gas: 1.0 is isothermal, right for small vessels and slow flow; 1.4 is adiabatic."""
     critical_ratio: float = CRITICAL_RATIO

@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["Plant", "PlantParameters", "Supply"]
 
 SUBSTEP = 50e-6
-"""Longest step of the integration, s: heights are then right to 1 µm, of bubbles that touch at rest; while those move, to 10 µm.
-
-A bubble that a push flings to another place goes there some ms earlier or later than with finer steps, and is up to 0.6 mm
-elsewhere on the way. Where it could fall to either side, the step may decide, as does all else that is small.
+"""Longest step of the integration, s: heights are then right to 1 µm.
 
 Stable up to twice the settling time of the node: 160 µs against the tube, 100 µs with both valves open,
 25 µs with both open and no restrictors (C = 0.03 dm³/(s·bar)), which needs a shorter step.
@@ -75,7 +72,8 @@ class Plant:
         self._state["stretch"] = 1.0
         self._state["pressure"] = self._state["node"] = ATMOSPHERE
         self._supply = np.array([astuple(parameters.supply)], kernel.SUPPLY)
-        self._air = np.array([(ATMOSPHERE + supply_pa, 0.0, 0.0)], kernel.AIR)
+        self._air = np.zeros(1, kernel.AIR)
+        self._air["pressure"] = ATMOSPHERE + supply_pa
         self._fill_on, self._vent_on = np.zeros(n), np.zeros(n)
         self._noise = np.zeros(n + 1)
         self._rng = np.random.default_rng(seed)
@@ -154,10 +152,17 @@ class Plant:
         `fill_stuck`, `vent_stuck`: 1 stuck open, -1 stuck closed.
         `sensor_stuck`: the count that it sticks at. `sensor_bias`: Pa added to what it sees.
         `sensor_absent`: 1 for a converter input that reads its pull-down, 0 counts.
+
+        Of the reservoir, whatever the `bubble`: `supply_stuck`, `supply_bias`, `supply_absent` the same of its sensor;
+        `supply_flat`: Pa that this says, with noise, whatever the pressure; `relief_stuck`: 1 for a relief valve that stays shut.
         """
-        if fault not in kernel.FAILURES:
-            raise InvalidInput(f"no failure is called {fault!r}; choose one of {', '.join(kernel.FAILURES)}")
-        self._state[fault][bubble] = value
+        if fault in kernel.SUPPLY_FAILURES:
+            self._air[fault] = value
+        elif fault in kernel.FAILURES:
+            self._state[fault][bubble] = value
+        else:
+            known = ", ".join(kernel.FAILURES + kernel.SUPPLY_FAILURES)
+            raise InvalidInput(f"no failure is called {fault!r}; choose one of {known}")
 
     def rest_at(self, height_mm: ArrayLike) -> None:
         """Put every bubble at rest at `height_mm`, one for all or (n,): valves shut, line at its pressure."""

@@ -28,7 +28,8 @@ BOARD_FAULTS = (
     (
         SUPPLY_LOST,
         "supply_lost",
-        "the reservoir stays below the pressure that is needed: everything vents",
+        "the reservoir stays below the pressure that is needed, or its sensor cannot be believed: everything vents, "
+        "the pump stops, the reservoir is emptied",
     ),
     (VALVE_CHIP, "valve_chip", "a valve driver does not answer: everything vents"),
     (SENSOR_CHIP, "sensor_chip", "a converter does not answer: its bubbles vent"),
@@ -42,6 +43,7 @@ BOARD_FAULTS = (
     ),
 )
 VENTING = ESTOP | SUPPLY_LOST | VALVE_CHIP | OVERFILLED  # while one of these stands, SHOW is refused
+SHUTTING = SUPPLY_LOST | OVERFILLED  # while one of these does, the pump stands and the dump valve is open
 
 # What else is written to the fault log: it forbids nothing. Bits beyond those of the board's faults.
 HOST_SILENT = 256
