@@ -6,6 +6,7 @@ import pytest
 import bubbleskin as bs
 from bubbleskin import boards
 from bubbleskin.sim.board import make_plant
+from bubbleskin.sim.plant import SUBSTEP, Plant, PlantParameters
 
 FLAT = 5.0
 TALL = 12.0
@@ -75,9 +76,31 @@ def test_snapshots_hold_the_places_too():
     assert run() == first
 
 
-def test_a_contact_for_another_number_of_bubbles_is_refused():
-    from bubbleskin.sim.plant import Plant, PlantParameters
+def test_the_step_is_as_fine_as_its_docstring_says():
+    """Filled and vented by pulses, held for half a second; nothing is flung to another place."""
 
+    def heights(contact, substep):
+        model = bs.CompliantContact(bs.Layout.hexagon(rings=1)) if contact else None
+        plant = Plant(PlantParameters.spread(7, 0.1, 1), seed=1, substep=substep, contact=model)
+        rng = np.random.default_rng(3)
+        seen = []
+        for tick in range(400):
+            pulses = rng.uniform(0, 4e-3, 7) * (rng.random(7) < 0.4)
+            fill, vent = pulses * (tick < 240), pulses * (240 <= tick < 300)
+            plant.advance(5e-3, fill, vent, pump=1.0)
+            seen.append(plant.height_mm)
+        return np.array(seen)
+
+    for contact, moving_um in ((False, 1.0), (True, 10.0)):
+        fine = heights(contact, 5e-6)
+        wrong_um = 1e3 * np.abs(heights(contact, SUBSTEP) - fine)
+        assert fine.max() > 12.0
+        assert wrong_um.max() < moving_um
+        assert wrong_um[-1].max() < 1.0
+        assert not contact or np.abs(fine - heights(False, 5e-6)).max() > 0.5
+
+
+def test_a_contact_for_another_number_of_bubbles_is_refused():
     with pytest.raises(bs.InvalidInput, match="7 bubbles, the plant has 3"):
         Plant(PlantParameters.nominal(3), contact=bs.CompliantContact(bs.Layout.hexagon(1)))
 

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 __all__ = ["Plant", "PlantParameters", "Supply"]
 
 SUBSTEP = 50e-6
-"""Longest step of the integration, s: heights are then right to 1 µm.
+"""Longest step of the integration, s: heights are then right to 1 µm, of bubbles that touch at rest; while those move, to 10 µm.
+
+A bubble that a push flings to another place goes there some ms earlier or later than with finer steps, and is up to 0.6 mm
+elsewhere on the way. Where it could fall to either side, the step may decide, as does all else that is small.
 
 Stable up to twice the settling time of the node: 160 µs against the tube, 100 µs with both valves open,
 25 µs with both open and no restrictors (C = 0.03 dm³/(s·bar)), which needs a shorter step.

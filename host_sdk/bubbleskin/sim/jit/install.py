@@ -57,6 +57,8 @@ def whole(value: Any) -> Any:
 def _await(held: FunctionType, function: FunctionType) -> None:
     """Let the first call of this function compile its module."""
     module, name = function.__module__, function.__name__
+    if module.startswith("bubble_firmware.drivers."):
+        return  # they read and write the chip's registers, for which tests give them what is no memory
     written = FunctionType(function.__code__, function.__globals__, name)  # the code is about to be another
     written.__annotations__ = function.__annotations__
     functions_of.setdefault(module, {})[name] = written
