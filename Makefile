@@ -9,19 +9,20 @@ EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz generate clean
+.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz generate lock clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 setup: $(READY) ## the virtual environment .venv with the bubbleskin command
 
-$(READY): pyproject.toml constraints.txt
+$(READY): pyproject.toml build.lock requirements.lock
 	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("bubbleskin needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.12")'
 	@echo "setting up $(VENV): a minute or two, once"
 	@$(PYTHON) -m venv $(VENV) || { echo "Python cannot make virtual environments here; on Debian: apt-get install python3-venv"; exit 1; }
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
-	@$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable . --group dev
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement build.lock
+	@$(BIN)/python -m pip install --quiet --require-hashes --no-build-isolation --requirement requirements.lock
+	@$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps --editable .
 	@touch $@
 
 demo: setup ## a simulated wristband takes two shapes; ends with a picture
@@ -55,7 +56,10 @@ lint: setup ## style, types, import contracts, the rules of tests/house
 	$(BIN)/python -m pytest -q -n 2 tests/house
 
 generated: setup ## fail if a generated file is out of date
-	@for tool in $(GENERATORS); do $(BIN)/python tools/generate/$$tool.py --check || exit 1; done; echo "generated files are up to date"
+	@for tool in $(GENERATORS); do $(BIN)/python tools/generate/$$tool.py --check || exit 1; done; $(BIN)/python tools/generate/lock.py --check && echo "generated files are up to date"
+
+lock: setup ## versions and hashes of what setup installs, after a change of requirements; asks the package index
+	$(BIN)/python tools/generate/lock.py
 
 generate: setup ## write all generated files
 	@for tool in $(GENERATORS); do $(BIN)/python tools/generate/$$tool.py || exit 1; done

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.toolchain.checksums import verify
 from bubbleskin.toolchain.commands import CommandRunner, tail
 from bubbleskin.toolchain.interpreter import VERSION
 
@@ -135,6 +136,8 @@ class DebianRoot:
         if not wanted:
             names = ", ".join(path.stem for path in offered)
             raise BubbleskinError(f"version {VERSION} is wanted, and apt offers {names}.")
+        for path in self._folder.glob("micropython_*"):
+            verify(path)
         source = self._folder / "source"
         self._runner.run("Unpacking the source", ["dpkg-source", "-x", str(wanted[0]), str(source)])
         return source
@@ -145,6 +148,7 @@ class DebianRoot:
         offered = list(self._folder.glob(f"{name}_*.deb"))
         if len(offered) != 1:
             raise BubbleskinError(f"apt brought {len(offered)} packages called {name} where one was asked for.")
+        verify(offered[0])
         unpacked = self._folder / name
         self._runner.run(f"Unpacking {name}", ["dpkg-deb", "-x", str(offered[0]), str(unpacked)])
         return unpacked
