@@ -4,7 +4,6 @@ Whatever goes wrong in it, the bubbles are vented and the next tick is tried. It
 than a tick.
 """
 
-import gc
 from array import array
 
 from bubble_firmware.board_state import BoardState
@@ -28,7 +27,7 @@ from bubble_firmware.store.record import Content
 from bubble_firmware.store.settings import Settings
 from bubble_firmware.store.slots import Store
 from bubble_firmware.tick_stats import TickStats
-from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, collect, const
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -59,7 +58,7 @@ class App:
     """The firmware of `board` on `hal`. Call `tick` once per period, and `listen` between two where there is time."""
 
     def __init__(self, board: "ModuleType", hal: "Hal"):
-        gc.collect()  # or what imports have left behind splits the heap where the bubbles' state is to go in one piece
+        collect()  # or what imports have left behind splits the heap where the bubbles' state is to go in one piece
         self.board = board
         self.hal = hal
         self.stats = TickStats(board)

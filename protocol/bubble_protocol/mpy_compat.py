@@ -33,6 +33,10 @@ try:
         """Free bytes of the garbage collected heap."""
         return gc.mem_free()  # type: ignore[attr-defined]
 
+    def collect() -> None:
+        """Free what nobody holds."""
+        gc.collect()
+
 except ImportError:
     COMPILED = False
     VIPER: "list[tuple[FunctionType, FunctionType]]" = []
@@ -97,3 +101,6 @@ except ImportError:
     def heap_free() -> int:
         """Free bytes of the heap: 0, CPython's heap has no fixed size."""
         return 0
+
+    def collect() -> None:
+        """Nothing: CPython frees by itself, and a look at all objects of a large program takes 0.2 s."""

@@ -5,80 +5,91 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
 
 from bubbleskin import native
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """A cache folder of this test's own, empty."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "bubbleskin" / "native"
+
+
+@pytest.fixture
+def loaded(cache):
+    """`loaded(factor)`: what a + factor b gives for 40 and 2, and whether it was compiled for that."""
+    compiled = []
+
+    def load(factor: int = 1, **options):
+        def make():
+            import numba
+
+            compiled.append(factor)
+            return {"added": numba.njit("int64(int64, int64)")(lambda a, b: a + factor * b)}
+
+        compiled.clear()
+        added = native.load("added", f"a + {factor} b".encode(), make, **options)["added"]
+        return added(40, 2), bool(compiled)
+
+    return load
+
+
+def test_it_is_compiled_once(loaded, cache):
+    assert [loaded(), loaded()] == [(42, True), (42, False)]
+    assert len(list(cache.iterdir())) == 1
+
+
+def test_another_source_is_compiled_anew(loaded):
+    assert [loaded(1), loaded(2), loaded(1)] == [(42, True), (44, True), (42, False)]
+
+
+def test_half_a_file_is_compiled_anew(loaded, cache):
+    loaded()
+    (path,) = cache.iterdir()
+    path.write_bytes(path.read_bytes()[:-100])
+    assert [loaded(), loaded()] == [(42, True), (42, False)]
+
+
+def test_where_nothing_can_be_kept_every_start_compiles_and_says_so(loaded, cache, capsys):
+    cache.parent.write_text("a file where a folder should be")
+    assert [loaded(), loaded()] == [(42, True), (42, True)]
+    told = capsys.readouterr().err
+    assert told.count(f"Native code cannot be kept in {cache}, so every start compiles: Not a directory.") == 1
+    with pytest.raises(NotADirectoryError):
+        loaded(unkept=False)
+
 
 ADDED = """
 from bubbleskin import native
 
 def make():
     import numba
-    return {{"added": numba.njit("int64(int64, int64)")(lambda a, b: a + {0} * b)}}
+    return {"added": numba.njit("int64(int64, int64)")(lambda a, b: a + b)}
 
-added = native.load("added", b"a + {0} b", make, **{1})["added"]
+print(native.load("added", b"a + b", make)["added"](40, 2))
 import sys
-print(added(40, 2), "numba" in sys.modules)
+print("numba" in sys.modules)
 """
 
 
-def run(cache, factor: int = 1, code: str = ADDED, **options):
-    """What a Python prints that loads a function from, or into, this cache folder: standard output and error."""
-    done = subprocess.run(
-        [sys.executable, "-c", code.format(factor, options)],
-        env={**os.environ, "XDG_CACHE_HOME": str(cache)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return done.stdout.strip(), done.stderr
+def run(cache, code: str = ADDED) -> tuple[list[str], str]:
+    """What a Python prints that loads a function from, or into, this cache folder: words of standard output, and error."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    return done.stdout.split(), done.stderr
 
 
-def kept(cache) -> list[str]:
-    return sorted(path.name for path in (cache / "bubbleskin" / "native").iterdir())
-
-
-def test_it_is_compiled_once_and_says_so(tmp_path):
-    said, told = run(tmp_path)
-    assert said == "42 True"
-    assert told == "Compiling the simulation for this computer, once: up to 20 s.\n"
-    assert run(tmp_path) == ("42 False", "")
-    assert len(kept(tmp_path)) == 1
-
-
-def test_another_source_is_compiled_anew(tmp_path):
-    assert run(tmp_path)[0] == "42 True"
-    assert run(tmp_path, factor=2)[0] == "44 True"
-    assert run(tmp_path)[0] == "42 False"
-
-
-def test_half_a_file_is_compiled_anew(tmp_path):
-    run(tmp_path)
-    (path,) = (tmp_path / "bubbleskin" / "native").iterdir()
-    path.write_bytes(path.read_bytes()[:-100])
-    assert run(tmp_path)[0] == "42 True"
-    assert run(tmp_path)[0] == "42 False"
-
-
-def test_two_processes_may_compile_at_once(tmp_path):
+def test_two_processes_may_compile_at_once_and_say_so_and_a_third_does_not_import_numba(tmp_path):
     with ThreadPoolExecutor() as pool:
         both = list(pool.map(run, [tmp_path] * 2))
-    assert {said.split()[0] for said, _ in both} == {"42"}
-    assert len(kept(tmp_path)) == 1
-    assert run(tmp_path) == ("42 False", "")
-
-
-def test_where_nothing_can_be_kept_every_start_compiles_and_says_so(tmp_path):
-    file = tmp_path / "file"
-    file.write_text("")
-    for _ in range(2):
-        said, told = run(file)
-        assert said == "42 True"
-        assert (
-            f"Native code cannot be kept in {file / 'bubbleskin' / 'native'}, so every start compiles: Not a dir"
-            in told
-        )
-    assert "NotADirectoryError" in run(file, unkept=False)[1]
+    said = "Compiling the simulation for this computer, once: up to 20 s.\n"
+    assert [words[0] for words, _ in both] == ["42", "42"]
+    assert said in {told for _, told in both} <= {"", said}
+    assert len(list((tmp_path / "bubbleskin" / "native").iterdir())) == 1
+    assert run(tmp_path) == (["42", "False"], "")
 
 
 @pytest.fixture(scope="module")
@@ -107,8 +118,6 @@ def test_numbers_go_in_and_out(functions):
 
 
 def test_a_pointer_is_an_address(functions):
-    import numpy as np
-
     numbers = np.zeros(3)
     assert functions["put"](numbers.ctypes.data, 1, 2.5) is None
     assert numbers.tolist() == [0, 2.5, 0]
@@ -128,7 +137,6 @@ def test_mistakes_are_exceptions(functions):
 def test_what_allocates_is_refused():
     def make():
         import numba
-        import numpy as np
 
         return {"made": numba.njit("float64(int64)")(lambda n: np.arange(n).astype(np.float64)[-1] + n)}
 
@@ -151,7 +159,7 @@ print(before, "numba" in sys.modules, out[0] > 1e4)
 
 
 def test_numba_comes_when_something_is_called(tmp_path):
-    assert run(tmp_path, code=LATER)[0] == "False True True"
+    assert run(tmp_path, LATER)[0] == ["False", "True", "True"]
 
 
 OPENED = """
