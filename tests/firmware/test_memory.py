@@ -6,7 +6,8 @@ import zlib
 import pytest
 
 from bubble_firmware import boards
-from bubble_protocol import steps
+from bubble_firmware.control import nominal
+from bubble_protocol import codec, steps
 from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import FRAME_MAX, HEADER, finish_frame, put_header
 from bubble_protocol.schema import messages, sequences
@@ -138,6 +139,9 @@ SEQUENCE += (
     *["STATE"] * 10,
     "SEQUENCE_CONTROL end",
 )
+EXTREMES = tuple(f"{name} {end}" for name in ("all", "repeated") for end in ("least", "greatest"))
+"""Every request with its fields at the ends of what the wire can say: `all` of them, or only what is repeated."""
+
 SEQUENCES = [
     pytest.param(ACTIVE, id="active"),
     pytest.param(("SHOW up", "HELLO", "STOP", "SHOW down", "VENT", "CLEAR", "TABLE_READ"), id="everything"),
@@ -153,6 +157,11 @@ SEQUENCES = [
         ("SHOW up", "FAULTS_READ", "SETTING_READ", "SETTING_WRITE", "no setting", "FAULTS_ACK", "VENT"), id="safety"
     ),
     pytest.param(("SETTING_WRITE", "SHOW up", "PING", "long silence", "STATE"), id="deadman"),
+    pytest.param(("SHOW up", "bad CRC", "bad table", "bad CRC", "VENT", "STORE_RESET", "too large"), id="hostile"),
+    pytest.param(
+        ("TABLE_COMMIT", "STORE_RESET", "bad CRC", "HELLO 9", "TABLE_COMMIT", "INFO"), id="resets and commits"
+    ),
+    *[pytest.param((name, "SHOW up", "VENT"), id=name) for name in EXTREMES],
 ]
 SESSIONS = 17
 """One more than the device remembers: the first may come again after the last."""
@@ -194,6 +203,11 @@ def request(name, n, number, session):
         "long silence": lambda: bytes(9 * 100),  # ticks; longer than SETTING_WRITE allows
     }
     requests |= {
+        "bad CRC": lambda: of("TABLE_COMMIT", (0x80000001,)),
+        "TABLE_COMMIT": lambda: of("TABLE_COMMIT", (nominal_crc(n),)),
+        "bad table": lambda: of("TABLE_WRITE", (n - 1, 0, 60), [(9000, 65535)] * 40),
+        "too large": lambda: of("FAULTS_ACK", (0x7FFFFFFF,)),
+        "HELLO 9": lambda: of("HELLO", (9, 9, session)),
         "SEQUENCE_BEGIN": lambda: of("SEQUENCE_BEGIN", (3, n, 0, 5, program_crc(n))),
         "SEQUENCE_WRITE": lambda: of("SEQUENCE_WRITE", (3, 0), program(n)),
         "SEQUENCE_ARM": lambda: of("SEQUENCE_ARM", (3,)),
@@ -204,7 +218,30 @@ def request(name, n, number, session):
         "SEQUENCE_BEGIN stream": lambda: of("SEQUENCE_BEGIN", (4, n, 0, 0, 0xFFFFFFFF)),
         "SEQUENCE_WRITE stream": lambda: of("SEQUENCE_WRITE", (4, 0), program(n)),
     }
+    if isinstance(name, tuple):
+        return of(*name)
     return requests[name]() if name in requests else of(name)
+
+
+def every_request(which):
+    """(name, fixed, repeated) of every request but those of no order and RESTART, its fields at an end of what they can be."""
+    ends = {
+        messages.U8: (0, 0xFF),
+        messages.U16: (0, 0xFFFF),
+        messages.I32: (-0x80000000, 0x7FFFFFFF),
+        messages.U32: (0, 0xFFFFFFFF),
+    }
+    for what in codec.BY_ID.values():
+        if (
+            what.id & messages.REPLY
+            or what.id | messages.REPLY not in codec.BY_ID
+            or what.name in ("HELLO", "PING", "RESTART")
+        ):
+            continue
+        end = which.endswith("greatest")
+        lows = [field[3] or 0 for field in what.fixed]
+        fixed = [ends[field[1]][end] for field in what.fixed] if which.startswith("all") else lows
+        yield what.name, tuple(fixed), [tuple(ends[field[1]][end] for field in what.repeated)] * bool(what.repeated)
 
 
 def rounds(sequence, n):
@@ -212,8 +249,8 @@ def rounds(sequence, n):
     for session in range(0x89ABCDEF, 0x89ABCDEF + SESSIONS):
         yield request("HELLO", n, 1, session)
         number, frames = 0, []
-        for name in sequence:
-            number += name not in ("HELLO", "PING", "garbage", "long silence")
+        for name in (one for some in sequence for one in (every_request(some) if some in EXTREMES else [some])):
+            number += name not in ("HELLO", "HELLO 9", "PING", "garbage", "long silence")
             if name == "STOP ahead":
                 number += 2
                 frames.append(request("STOP", n, number, session))
@@ -223,6 +260,10 @@ def rounds(sequence, n):
         if sequence == OUT_OF_ORDER:
             frames = [frames[at] for at in (0, 4, 1, 3, 2, 1, 5, 6, 6, 7, 5, 8, 0)]
         yield b"".join(frames)
+
+
+def nominal_crc(n):
+    return zlib.crc32(b"".join(struct.pack("<2H", *knot) for knot in nominal.KNOTS) * n)
 
 
 def program(n):

@@ -7,13 +7,15 @@ from hypothesis import strategies as st
 from bubble_firmware.device_clock import LATEST, DeviceClock
 from bubble_firmware.safety import state as safety
 from bubble_firmware.safety.fault_log import FaultLog
-from bubble_protocol.schema import errors, modes, system
+from bubble_protocol.schema import errors, messages, modes, system
 from bubble_protocol.schema.faults import BOARD, BUDGET, ESTOP, HOST_SILENT, OVERFILLED, VALVE_CHIP, VENTING
 from bubble_protocol.schema.modes import ACTIVE, BOOT, FAULTED, HOLDING, IDLE, STOPPED
 from bubble_protocol.schema.modes import VENTING as MODE_VENTING
 from bubble_protocol.schema.settings import BUDGET_KPA_S, DEADMAN_HOLD
+from bubbleskin.link import message as wire
 
 HELD_PA, HELD_UM = 22609, 10008  # a knot of the nominal table
+SESSION = 0x89ABCDEF  # that a rig opens
 
 
 def hold(rig):
@@ -154,6 +156,30 @@ def test_a_host_that_speaks_is_not_silent(rig7):
         rig7.hal.to_device += garbage
         silence(rig7, 10)
     assert rig7.app.safety.mode == MODE_VENTING
+
+
+@pytest.mark.parametrize("greeting", ["no protocol in common", "no session", "a session that is over"])
+def test_a_host_that_is_refused_keeps_nothing_alive(rig7, greeting):
+    rig7.open(SESSION + 1)
+    hold(rig7)
+    asked = {"no protocol in common": (9, 9, 5), "no session": (2, 2, 0), "a session that is over": (2, 2, SESSION)}
+    for tick in range(3_000_000 // rig7.board.TICK_US):
+        if not tick % 10:
+            rig7.hal.to_device += wire.encode("HELLO", 0, asked[greeting])
+        rig7.app.tick()
+    assert rig7.app.safety.control_mode == 0
+    assert vented(rig7)
+    refusals = [message for message in rig7.heard() if message.id == messages.ERROR]
+    assert len(refusals) > 50
+
+
+def test_a_host_that_has_a_session_keeps_alive_by_its_greeting_too(rig7):
+    hold(rig7)
+    for tick in range(3_000_000 // rig7.board.TICK_US):
+        if not tick % 10:
+            rig7.hal.to_device += wire.encode("HELLO", 0, (2, 2, SESSION))
+        rig7.app.tick()
+    assert rig7.app.safety.mode == ACTIVE
 
 
 def test_held_by_stop_it_vents_when_the_host_is_silent(rig7):

@@ -12,4 +12,5 @@ def test_checksum_of_all_tables_is_the_one_in_the_file():
         knots = zip(table.height_um.tolist(), table.pressure_pa.tolist(), strict=True)
         for index, (height, pressure) in enumerate(knots):
             mine.write_knot(bubble, index, height, pressure)
-    assert mine.received_crc() & 0xFFFFFFFF == calibration.crc32
+    mine.check_received()
+    assert mine.received_crc[0] & 0xFFFFFFFF == calibration.crc32

@@ -65,7 +65,7 @@ def say(device):
     store = device.store
     found = array("i", bytearray(4 * 4 * device.board.BUBBLES))
     device.trim.read(found)
-    print(store.source, store.generation, list(store.states), list(store.wear), store.length, device.tables.crc)
+    print(store.source, store.generation, list(store.states), list(store.wear), store.length, device.tables.crc[0])
     print(list(found), list(device.settings.values), list(device.tables.sizes))
 
 

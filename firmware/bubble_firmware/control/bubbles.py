@@ -42,7 +42,6 @@ _HOLD_OUTPUT = const(34)
 _FIRST_SEGMENT = const(35)
 _LAST_SEGMENT = const(36)
 _LOWEST_PRESSURE = const(37)
-_HIGHEST_PRESSURE = const(38)
 _ROW_WORDS = const(41)
 _KNOT_AIR = const(1)
 _KNOT_WORDS = const(5)
@@ -187,7 +186,7 @@ class Bubbles:
             )
             rows[at + _FIRST_SEGMENT] = 4 * first
             rows[at + _LAST_SEGMENT] = 4 * (first + _KNOT_WORDS * (knots - 2))
-            rows[at + _LOWEST_PRESSURE], rows[at + _HIGHEST_PRESSURE] = self._tables.pressures(i)
+            self._tables.read_pressures(i, rows, at + _LOWEST_PRESSURE)
             rows[at + _HEIGHT_SEGMENT] = rows[at + _SETPOINT_SEGMENT] = 4 * first
             rows[at + _QUIESCENT] = rows[at + _HOLD_OUTPUT] = 0
             rows[at + _RAMPING] = 1  # the setpoint's air is to be found again

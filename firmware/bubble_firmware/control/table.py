@@ -6,23 +6,26 @@ Two sets: the one in use and the one being received. A commit checks the receive
 from array import array
 
 from bubble_firmware.control.nominal import KNOTS as NOMINAL
+from bubble_protocol.buffers import copy
 from bubble_protocol.crc import crc32_on
+from bubble_protocol.mpy_compat import const
+from bubble_protocol.steps import copy_word
 
-KNOTS_MAX = 64
-KNOT_BYTES = 4
+KNOTS_MAX = const(64)
+KNOT_BYTES = const(4)  # a step of `range` that is no constant makes an object
 HEIGHT_MAX_UM = 16000  # beyond, the air of a bubble no longer fits the arithmetic of `bubbles`
 
 
 class Tables:
-    """All bubbles' tables: `knots` and `sizes` in use, and a second set that `write` fills and `commit` takes up."""
+    """All bubbles' tables: `knots` and `sizes` in use, of this `crc`, and a second set that is written to and then swapped in."""
 
     def __init__(self, bubbles: int):
         self.bubbles = bubbles
         self.knots = bytearray(bubbles * KNOTS_MAX * KNOT_BYTES)
         self.sizes = array("i", bytearray(4 * bubbles))
-        self.crc = 0  # made once by `swap`: handing on an integer, however long, allocates nothing
         self._received = bytearray(len(self.knots))
-        self._crc = array("i", (0,))
+        self.crc = array("i", (0,))  # as words: an integer of MicroPython that is so long is an allocation
+        self.received_crc = array("i", (0,))
         self._received_sizes = array("i", bytearray(4 * bubbles))
         self.use_nominal()
 
@@ -55,16 +58,19 @@ class Tables:
         values[at] = knots[byte] | knots[byte + 1] << 8
         values[at + 1] = knots[byte + 2] | knots[byte + 3] << 8
 
-    def pressures(self, bubble: int) -> "tuple[int, int]":
-        """The least and the greatest pressure in a table in use, Pa."""
+    def read_pressures(self, bubble: int, values: "array[int] | memoryview", at: int) -> None:
+        """Put the least and the greatest pressure in a table in use, Pa, at `values[at:at + 2]`."""
         start = bubble * KNOTS_MAX * KNOT_BYTES
         knots = self.knots
         least = most = knots[start + 2] | knots[start + 3] << 8
-        for at in range(start, start + self.sizes[bubble] * KNOT_BYTES, KNOT_BYTES):
-            pressure = knots[at + 2] | knots[at + 3] << 8
-            least = min(least, pressure)
-            most = max(most, pressure)
-        return least, most
+        for byte in range(start, start + self.sizes[bubble] * KNOT_BYTES, KNOT_BYTES):
+            pressure = knots[byte + 2] | knots[byte + 3] << 8
+            if pressure < least:
+                least = pressure
+            if pressure > most:
+                most = pressure
+        values[at] = least
+        values[at + 1] = most
 
     def first_flaw(self, height_max_um: int, pressure_max_pa: int) -> int:
         """Where the received set cannot be used: bubble * KNOTS_MAX + knot, or -1 where all is well.
@@ -86,16 +92,17 @@ class Tables:
                 return bubble * KNOTS_MAX + size - 1
         return -1
 
-    def received_crc(self) -> int:
-        """CRC-32 of the received set, as a signed word: per bubble its knots as (u16 µm, u16 Pa)."""
-        self._crc[0] = 0
+    def check_received(self) -> None:
+        """Work out `received_crc`, the CRC-32 of the received set as a signed word: per bubble its knots as (u16 µm, u16 Pa)."""
+        self.received_crc[0] = 0
         for bubble in range(self.bubbles):
             start = bubble * KNOTS_MAX * KNOT_BYTES
-            crc32_on(self._received, start, start + self._received_sizes[bubble] * KNOT_BYTES, self._crc)
-        return self._crc[0]
+            crc32_on(self._received, start, start + self._received_sizes[bubble] * KNOT_BYTES, self.received_crc)
 
     def swap(self) -> None:
         """Use the received set; what is received next starts from a copy of it."""
-        self.crc = self.received_crc()
-        self.knots[:] = self._received
-        self.sizes[:] = self._received_sizes
+        self.check_received()
+        copy_word(self.received_crc, 0, self.crc, 0)
+        copy(self._received, 0, len(self._received), self.knots, 0)
+        for bubble in range(self.bubbles):
+            self.sizes[bubble] = self._received_sizes[bubble]

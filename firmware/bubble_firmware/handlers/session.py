@@ -7,6 +7,7 @@ from bubble_protocol import codec
 from bubble_protocol.crc import crc32_on
 from bubble_protocol.frame import Decoder
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+from bubble_protocol.steps import copy_word
 from bubble_protocol.version import FIRMWARE, PROTOCOL_MAX, PROTOCOL_MIN
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ class SessionHandlers(Handlers):
         values[_HELLO_PRESSURE_MAX_PA] = board.PRESSURE_MAX_PA
         values[_HELLO_WINDOW] = _WINDOW
         values[_HELLO_CAPABILITIES] = self._server.capabilities
-        values[_HELLO_TABLES_CRC] = self._tables.crc
+        copy_word(self._tables.crc, 0, values, _HELLO_TABLES_CRC)
         self._reply.reply(0)
 
     def _ping(self, count: int) -> None:

@@ -79,5 +79,5 @@ class SettingHandlers(Handlers):
         if number >= settings.count:
             reply.refuse(_NO_SETTING, _WRITE_SETTING, index, number, 0, settings.count - 1)
             return
-        value = values[_WRITE_STRIDE * index + _WRITE_VALUE]
-        reply.refuse(_OUT_OF_RANGE, _WRITE_VALUE, index, value, settings.lows[number], settings.highs[number])
+        at = _WRITE_STRIDE * index + _WRITE_VALUE
+        reply.refuse_value(_OUT_OF_RANGE, _WRITE_VALUE, index, at, settings.lows[number], settings.highs[number])

@@ -6,6 +6,7 @@ Flash is written only while the bubbles are vented: an erase stops everything, i
 from bubble_firmware.handlers.vented import is_vented
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+from bubble_protocol.steps import copy_word
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,6 +90,6 @@ class StoreHandlers(Handlers):
         values[_STORE_WEAR_B] = store.wear[1]
         values[_STORE_SIZE] = store.length
         values[_STORE_CAPACITY] = store.capacity
-        values[_STORE_TABLES_CRC] = store.tables_crc
+        copy_word(store.tables_crc, 0, values, _STORE_TABLES_CRC)
         values[_STORE_ERROR] = store.error
         self._reply.reply(0)

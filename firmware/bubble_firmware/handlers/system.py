@@ -2,6 +2,7 @@
 
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const, heap_free
+from bubble_protocol.steps import copy_word
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -96,7 +97,7 @@ class SystemHandlers(Handlers):
         values[_INFO_TELEMETRY_DROPPED] = server.telemetry.dropped
         values[_INFO_HEAP_FREE] = self._heap_free
         values[_INFO_SUPPLY_PA] = state.supply.pressure_pa
-        values[_INFO_TABLES_CRC] = self._tables.crc
+        copy_word(self._tables.crc, 0, values, _INFO_TABLES_CRC)
         values[_INFO_MODE] = state.safety.mode
         values[_INFO_BOARD_FAULTS] = state.faults.board
         values[_INFO_SELF_TEST] = test.outcome

@@ -3,6 +3,7 @@
 from bubble_firmware.control.table import KNOTS_MAX
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+from bubble_protocol.steps import copy_word, same_word
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -86,12 +87,14 @@ class TableHandlers(Handlers):
         if invalid >= 0:
             bubble, knot = invalid // KNOTS_MAX, invalid % KNOTS_MAX
             self._reply.refuse(_BAD_TABLE, 0, bubble, knot, 0, board.PRESSURE_MAX_PA)
-        elif values[_COMMIT_CRC] != tables.received_crc():
+            return
+        tables.check_received()
+        if not same_word(values, _COMMIT_CRC, tables.received_crc, 0):
             self._reply.refuse(_BAD_CRC, _COMMIT_CRC, _NO_ELEMENT, 0, 0, 0)
         else:
             tables.swap()
             self._bubbles.use_tables()
-            values[_COMMITTED_TABLES_CRC] = tables.crc
+            copy_word(tables.crc, 0, values, _COMMITTED_TABLES_CRC)
             self._reply.reply(0)
 
     def _read(self, count: int) -> None:

@@ -1,6 +1,7 @@
 """What handles requests, and what it is given: the request's values, and the ways to answer."""
 
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+from bubble_protocol.steps import copy_word
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -61,12 +62,20 @@ class Reply:
         `field`: index of the field that is at fault. `element`: which repetition, or NO_ELEMENT. `asked`: its value.
         `low`, `high`: what is allowed.
         """
+        self.values[_ERROR_ASKED] = asked
+        self._refuse(error, field, element, low, high)
+
+    def refuse_value(self, error: int, field: int, element: int, at: int, low: int, high: int) -> None:
+        """Answer with an ERROR about `values[at]`, whatever its size: as an integer of MicroPython it could be an allocation."""
+        copy_word(self.values, at, self.values, _ERROR_ASKED)
+        self._refuse(error, field, element, low, high)
+
+    def _refuse(self, error: int, field: int, element: int, low: int, high: int) -> None:
         values = self.values
         values[_ERROR_REQUEST] = self.request
         values[_ERROR_ERROR] = error
         values[_ERROR_FIELD] = field
         values[_ERROR_ELEMENT] = element
-        values[_ERROR_ASKED] = asked
         values[_ERROR_LOW] = low
         values[_ERROR_HIGH] = high
         self._answer(_ERROR, 0)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # [constants] bubble_protocol.schema.messages: HELLO PING STOP VENT
 # [constants] bubble_protocol.schema.errors: FAULTED NO_ELEMENT OUT_OF_RANGE OVERTAKEN UNKNOWN_MESSAGE WRONG_LENGTH
 # [constants] bubble_protocol.schema.system: REPLIES_KEPT
-# [constants] bubble_firmware.link.receive_window: OPENED WINDOW
+# [constants] bubble_firmware.link.receive_window: OPENED SAME WINDOW
 _HELLO = const(1)
 _PING = const(2)
 _STOP = const(11)
@@ -38,6 +38,7 @@ _UNKNOWN_MESSAGE = const(1)
 _WRONG_LENGTH = const(2)
 _REPLIES_KEPT = const(16)
 _OPENED = const(2)
+_SAME = const(0)
 _WINDOW = const(8)
 # [end of constants]
 
@@ -64,6 +65,7 @@ class Server:
         self.capabilities = 0
         self._chunk = bytearray(_CHUNK)
         self._budget = 0
+        self._has_session = False
         self._handlers: "dict[int, Callable[[int], None]]" = {}
         self._slow: "set[int]" = set()
 
@@ -102,8 +104,11 @@ class Server:
         """Open the session whose number stands at byte `at` of the frame in the decoder; see `ReceiveWindow.open`."""
         opened = self.window.open(self.decoder.frame, at)
         if opened == _OPENED:
+            self._has_session = True
             self.sender.unsent = 0
             self.telemetry.subscribe(0, 0)  # a new host has not subscribed
+        if opened == _OPENED or opened == _SAME:
+            self._hear()
         return opened
 
     def fail(self) -> None:
@@ -117,11 +122,18 @@ class Server:
 
     # Whose turn it is.
 
+    def _hear(self) -> None:
+        """A host that has a session is alive. One that greets in vain, or knows of none, is not: it controls nothing."""
+        if self._has_session:
+            self._deadman.host_activity()
+
     def take(self, message_id: int, number: int) -> None:
         """A frame stands in the decoder. HELLO and PING know no order, STOP and VENT overtake it."""
         decoder = self.decoder
         window = self.window
         if message_id == _HELLO or message_id == _PING:
+            if message_id == _PING:
+                self._hear()
             self.reply.begin(message_id, number, False)
             self._handle(message_id, decoder.frame, decoder.length - HEADER)
             return
@@ -148,6 +160,7 @@ class Server:
         """Handle the request whose turn it is."""
         message_id = frame[1]
         self._budget -= _BUDGET if message_id in self._slow else 1
+        self._hear()
         self.reply.begin(message_id, self.window.expected, True)
         self.window.advance()
         self._handle(message_id, frame, length - HEADER)
@@ -162,7 +175,6 @@ class Server:
 
     def _handle(self, message_id: int, frame: bytearray, size: int) -> None:
         reply = self.reply
-        self._deadman.host_activity()
         handler = self._handlers.get(message_id)
         if handler is None:
             reply.refuse(_UNKNOWN_MESSAGE, 0, _NO_ELEMENT, message_id, 0, 0)
@@ -184,11 +196,14 @@ class Server:
         fixed = len(message.fixed)
         number = at
         element = _NO_ELEMENT
-        if at >= fixed:
-            number = fixed + (at - fixed) % message.stride_values
+        if at < fixed:
+            field = message.fixed[at]
+        else:
+            offset = (at - fixed) % message.stride_values
+            field = message.repeated[offset]
+            number = fixed + offset
             element = (at - fixed) // message.stride_values
-        field = (message.fixed + message.repeated)[number]
         low = field[3]
         high = field[4]
-        self.reply.refuse(_OUT_OF_RANGE, number, element, values[at], low or 0, 65535 if high is None else high)
+        self.reply.refuse_value(_OUT_OF_RANGE, number, element, at, low or 0, 65535 if high is None else high)
         return False

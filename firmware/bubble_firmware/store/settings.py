@@ -4,6 +4,7 @@ from array import array
 
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.schema.settings import SETTINGS
+from bubble_protocol.steps import small_word
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -49,7 +50,7 @@ class Settings:
             wanted[number] = self.values[number]
         for index in range(count):
             number = values[at + 2 * index]
-            value = values[at + 2 * index + 1]
+            value = small_word(values, at + 2 * index + 1)
             if number >= self.count or not self.lows[number] <= value <= self.highs[number]:
                 return index
             wanted[number] = value

@@ -18,6 +18,7 @@ from bubble_firmware.store.record import SCHEMA
 from bubble_protocol.buffers import copy, get16, get32, put16, put32, same
 from bubble_protocol.crc import crc32_into
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
+from bubble_protocol.steps import copy_word
 
 if TYPE_CHECKING:
     from bubble_firmware.hal.base import Flash
@@ -61,7 +62,7 @@ class Store:
     """The store of `content` on `flash`, None where the board has none. Made once at boot; it then has loaded what is there.
 
     `source`: where what is in use came from. `states`: of both slots. `generation`, `schema`, `length`: of the record in use.
-    `wear`: erases of each slot. `tables_crc`: of the tables stored. `error`: why the last `save` or `reset` was refused.
+    `wear`: erases of each slot. `tables_crc`: of the tables stored, a word. `error`: why the last `save` or `reset` was refused.
     """
 
     def __init__(self, name: str, flash: "Flash | None", content: "Content"):
@@ -79,7 +80,7 @@ class Store:
         self.schema = SCHEMA
         self.length = 0
         self.wear = array("i", (0, 0))
-        self.tables_crc = 0
+        self.tables_crc = array("i", (0,))
         self.error = 0 if flash else _STORE_FAILED
         self.source = _NO_STORE
         if flash:
@@ -88,7 +89,7 @@ class Store:
             except Exception:  # a store must not keep a wristband from booting
                 self._content.use_defaults()
                 self.source = _DAMAGED
-        self.tables_crc = content.tables.crc
+        copy_word(content.tables.crc, 0, self.tables_crc, 0)
 
     def save(self) -> bool:
         """Store what is in use. False, with `error`, where that cannot be; what was stored then still is."""
@@ -110,7 +111,7 @@ class Store:
             if not self._commit(self._protected(), _HEADER):
                 return False
         self._content.use_defaults()
-        self.tables_crc = self._content.tables.crc
+        copy_word(self._content.tables.crc, 0, self.tables_crc, 0)
         self.source = _FACTORY
         return True
 
@@ -251,7 +252,7 @@ class Store:
         self.states[slot] = _SLOT_VALID
         self._set_current(slot, length)
         self.source = _SLOT_A + slot
-        self.tables_crc = self._content.tables.crc
+        copy_word(self._content.tables.crc, 0, self.tables_crc, 0)
         return True
 
     def _finish(self, end: int, generation: int) -> None:
