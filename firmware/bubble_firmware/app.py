@@ -65,7 +65,7 @@ class App:
         self.tables = Tables(board.BUBBLES)
         self.bubbles = Bubbles(board, self.tables)
         self.trim = Trim(board, self.bubbles)
-        self.state = state = BoardState(board, hal.self_test, self.bubbles)
+        self.state = state = BoardState(board, hal, self.bubbles)
         self.clock = state.clock
         self.supply = state.supply
         self.self_test = state.self_test

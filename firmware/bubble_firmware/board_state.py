@@ -13,15 +13,16 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from bubble_firmware.control.bubbles import Bubbles
+    from bubble_firmware.hal.base import Hal
 
 
 class BoardState:
     """The board's time, supply, mode, faults, deadman and self-test, each an object that changes itself."""
 
-    def __init__(self, board: "ModuleType", self_test: bool, bubbles: "Bubbles"):
-        self.clock = DeviceClock()
+    def __init__(self, board: "ModuleType", hal: "Hal", bubbles: "Bubbles"):
+        self.clock = DeviceClock(hal.boot_ticks)
         self.supply = Supply(board)
-        self.self_test = SelfTest(board, self_test)
+        self.self_test = SelfTest(board, hal.self_test)
         self.safety = SafetyState(board)
         self.deadman = Deadman(board)
         self.fault_monitor = FaultMonitor(board, bubbles)

@@ -33,10 +33,10 @@ def ticks_add(ticks: int, periods: int) -> int:
 
 
 class DeviceClock:
-    """`ticks` is the number of this tick; -1 before the first. After LATEST it goes on from 0: no integer becomes long."""
+    """`ticks` is the number of this tick; `before` the first. After LATEST it goes on from 0: no integer becomes long."""
 
-    def __init__(self) -> None:
-        self.ticks = -1
+    def __init__(self, before: int = -1):
+        self.ticks = before
 
     def advance(self, periods: int) -> None:
         """So many periods have begun."""

@@ -12,7 +12,7 @@ _SPARE = 2048  # bytes
 _COLLECT = 16384  # bytes between two collections while there are imports
 
 
-def lockstep(board: "ModuleType", boot_id: int) -> None:
+def lockstep(board: "ModuleType", boot_id: int, boot_ticks: int = -1) -> None:
     """Run the firmware of `board` against a plant at the other end of stdin and stdout."""
     # Room near the heap's start, and no collection in a tick, as on the Pico: see `pico`.
     spare = bytearray(_SPARE)
@@ -20,7 +20,7 @@ def lockstep(board: "ModuleType", boot_id: int) -> None:
     from bubble_firmware.hal.lockstep import LockstepHal
 
     gc.threshold(-1)
-    hal = LockstepHal(board, boot_id)
+    hal = LockstepHal(board, boot_id, boot_ticks)
     while not hal.ended:
         app = App(board, hal)
         del spare

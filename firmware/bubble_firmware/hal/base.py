@@ -32,6 +32,7 @@ ABSENT = const(0xFFFF)
 class Hal:
     """The hardware of `board`; as it stands here, a board at rest with nobody at the other end of its link.
 
+    `boot_ticks`: device time before the first tick.
     `boot_id`: another number each boot. `late_ticks`: ticks that began late. `active_faults`: faults of the board that
     are there now, as bits, found by `read_sensors`. `boot_faults`: those of the time before this boot. `self_test`:
     whether there are valves and sensors to test. `flash`: where the store is, None where there is none.
@@ -41,6 +42,7 @@ class Hal:
     """
 
     boot_id = 1
+    boot_ticks = -1
     late_ticks = 0
     active_faults = 0
     boot_faults = 0

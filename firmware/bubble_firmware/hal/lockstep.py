@@ -29,10 +29,11 @@ _FLASH = 4 * SECTOR
 class LockstepHal(Hal):
     """The hardware of `board`, on stdin and stdout of this interpreter. `ended`: the pipe has closed."""
 
-    def __init__(self, board: "ModuleType", boot_id: int):
+    def __init__(self, board: "ModuleType", boot_id: int, boot_ticks: int = -1):
         super().__init__(board)
         bubbles = board.BUBBLES
         self.boot_id = boot_id
+        self.boot_ticks = boot_ticks
         self.flash = Memory(_FLASH)
         self.ended = False
         self._restarting = False

@@ -2,6 +2,7 @@
 
 from array import array
 
+from bubble_firmware.device_clock import ticks_add, ticks_diff
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol import steps
 from bubble_protocol.crc import crc32_word
@@ -260,10 +261,10 @@ class SequenceHandlers(Handlers):
             self._refuse(_BOARD_FAULT, 0, faults, 0, 0)
             return
         tick = steps.small_word(self._reply.values, _START_START_TICKS)
-        soonest = self._clock.ticks + 1
+        soonest = ticks_add(self._clock.ticks, 1)
         if tick == 0:
             tick = soonest
-        if tick < soonest:
+        if ticks_diff(tick, soonest) < 0:
             self._refuse(_TOO_LATE, _START_START_TICKS, tick, soonest, 0)
             return
         player.start_at(tick)

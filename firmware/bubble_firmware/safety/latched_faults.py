@@ -118,4 +118,5 @@ class LatchedFaults:
         return released
 
     def _left(self, since: int) -> int:
-        return self._isolation - ticks_diff(self._clock.ticks, since)
+        ticks = ticks_diff(self._clock.ticks, since)
+        return self._isolation - ticks if ticks >= 0 else 0  # it has lasted for longer than differences of ticks reach

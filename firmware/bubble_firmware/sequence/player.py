@@ -6,6 +6,7 @@ step begins in the tick of its schedule, however many came before it. Memory is 
 
 from array import array
 
+from bubble_firmware.device_clock import ticks_add, ticks_diff
 from bubble_firmware.sequence.memory import SequenceMemory, word
 from bubble_protocol import steps
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
@@ -138,14 +139,14 @@ class Player:
     def pause(self) -> None:
         """Let time and setpoints stand still."""
         if self.state == _PLAYING:
-            self._elapsed = self._clock.ticks - self.begun
+            self._elapsed = ticks_diff(self._clock.ticks, self.begun)
             self.state = _PAUSED
             self._keep_event(_SEQUENCE_PAUSED, _UNENDED, self._clock.ticks)
 
     def resume(self) -> None:
         """Let time go on from where it stood still."""
         if self.state == _PAUSED:
-            self.begun = self._clock.ticks - self._elapsed
+            self.begun = ticks_add(self._clock.ticks, -self._elapsed)
             self.state = _PLAYING
             self._keep_event(_SEQUENCE_RESUMED, _UNENDED, self._clock.ticks)
 
@@ -160,21 +161,21 @@ class Player:
         """One period, before anything of it has been decided. What the sequence wants done at its end: see `steps.GO_ON`."""
         now = self._clock.ticks
         if self.state == _WAITING:
-            if now < self.start:
+            if ticks_diff(now, self.start) < 0:
                 return _THEN_GO_ON
             self._open()
             if not self.running:
                 return _THEN_GO_ON
         elif self.state == _PAUSED:
-            self.begun = now - self._elapsed
-        elapsed = now - self.begun
+            self.begun = ticks_add(now, -self._elapsed)
+        elapsed = ticks_diff(now, self.begun)
         if self.state == _PLAYING:
             reason = self._over(elapsed)
             while reason:
                 self._next(reason)
                 if self.state != _PLAYING:
                     return self._then if self.reason == _BY_TIMEOUT else _THEN_GO_ON
-                elapsed = now - self.begun
+                elapsed = ticks_diff(now, self.begun)
                 reason = self._over(elapsed)
         if self._moving:
             share = steps.ease(elapsed + 1, self._ramp, self._easing)
@@ -216,7 +217,7 @@ class Player:
         """Begin the step that follows one that ended for `reason`, or end the sequence."""
         tick = self._clock.ticks
         if not self._settle:
-            tick = self.begun + self._length
+            tick = ticks_add(self.begun, self._length)
         elif reason == _BY_TIMEOUT:
             self.timeouts += 1
             if self._then != _THEN_GO_ON:

@@ -5,6 +5,7 @@ import dataclasses
 import math
 
 from bubble_protocol.schema import sequences
+from bubble_protocol.schema.system import TICKS_WRAP
 from bubbleskin.device.health import Health
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State, bubbles_of
@@ -62,11 +63,12 @@ class Player:
     def _tick(self, at: float | None) -> int:
         if at is None:
             return 0
-        if not (math.isfinite(at) and 0 < at < 2**30 * self._info.tick):
+        if not (math.isfinite(at) and at > 0):
             raise InvalidInput(
                 f"A sequence cannot start at {at} s; give a device time in s, as of `state().time`, or None."
             )
-        return max(1, round(at / self._info.tick))
+        # Device time on the wire goes on from 0, and 0 says "at once": what falls on it starts a tick later.
+        return round(at / self._info.tick) % TICKS_WRAP or 1
 
     async def status(self) -> PlaybackStatus:
         """See `Skin.playing`."""

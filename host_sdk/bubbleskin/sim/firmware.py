@@ -46,10 +46,11 @@ class Firmware(ABC):
 class InProcessFirmware(Firmware, Hal):
     """The firmware in this very interpreter. It is also the hardware under it."""
 
-    def __init__(self, board: ModuleType, boot_id: int, flash: NorFlash | None = None):
+    def __init__(self, board: ModuleType, boot_id: int, flash: NorFlash | None = None, boot_ticks: int = -1):
         jit.enable()
         super().__init__(board)
         self.boot_id = boot_id
+        self.boot_ticks = boot_ticks
         self.flash = flash or NorFlash()
         self._restarting = False
         self._counts = array("H", bytes(2 * (board.BUBBLES + 1)))

@@ -29,7 +29,7 @@ gc.threshold(16384)  # bytes: what compiling leaves behind goes at once, or the 
 sys.path[:] = {path!r}
 from bubble_firmware.main import lockstep
 {import_board}
-lockstep(board, {boot_id})
+lockstep(board, {boot_id}, {boot_ticks})
 """
 
 
@@ -41,7 +41,7 @@ def source_path() -> list[str]:
 class MicroPythonFirmware(Firmware):
     """A `Firmware` in another process, talked to through `bubble_firmware.hal.lockstep`."""
 
-    def __init__(self, board: ModuleType, boot_id: int):
+    def __init__(self, board: ModuleType, boot_id: int, boot_ticks: int = -1):
         interpreter = find_micropython()
         path = source_path()
         own = boards.own_file(board)
@@ -50,7 +50,7 @@ class MicroPythonFirmware(Firmware):
         import_board = (
             f"import {board.NAME} as board" if own else f"from bubble_firmware.boards import {board.NAME} as board"
         )
-        program = _PROGRAM.format(path=path, import_board=import_board, boot_id=boot_id)
+        program = _PROGRAM.format(path=path, import_board=import_board, boot_id=boot_id, boot_ticks=boot_ticks)
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has died
         try:
             self._process = subprocess.Popen(
