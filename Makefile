@@ -31,6 +31,8 @@ demo: setup ## a simulated wristband takes two shapes; ends with a picture
 test: setup lint generated micropython ## every check that needs no hardware, 16 minutes
 	@echo "the everyday tests; coverage is recorded in these, because it makes them half as slow again"
 	$(BIN)/python -m pytest $(EVERYDAY) --cov --cov-report=term
+	@echo "the firmware's arithmetic as Python that raises where a result leaves 32 bits"
+	BUBBLESKIN_JIT=check $(BIN)/python -m pytest -q -n 2 tests/firmware/test_golden_traces.py tests/firmware/test_arithmetic.py
 	@echo "hil_tests where bubbles touch"
 	$(BIN)/python -m pytest -q -n 2 hil_tests --target "sim://wristband7"
 	@echo "the slow tests"
