@@ -206,92 +206,91 @@ _nonsense = st.sampled_from([14001, 20000, 65535])
 _durations = st.sampled_from([0.005, 0.02, 0.1, 0.3, 0.7, 1.1, 2.0])
 
 
-def machine(spoil=None):
-    """The machine; `spoil` takes a rule out of the firmware after each boot."""
+class Promises(RuleBasedStateMachine):
+    """Anything a host or the world may do, in any order."""
 
-    class Promises(RuleBasedStateMachine):
-        @initialize(
-            board=st.sampled_from(["wristband7", "wristband7", "wristband7", "wristband19"]),
-            seed=st.integers(0, 1000),
-            world=st.sampled_from([(False, 0.0), (False, 0.0), (True, 0.0), (False, 0.05)]),
-        )
-        def boot(self, board, seed, world):
-            contact, spread = world
-            self.world = World(board, seed=seed, contact=contact, spread=spread, host=spoil)
+    spoil = None  # takes a rule out of the firmware after each boot
 
-        @rule(data=st.data(), ramp_ms=st.sampled_from([0, 0, 30, 500]), duration=_durations)
-        def show(self, data, ramp_ms, duration):
-            n = self.world.bubbles
-            heights = data.draw(_heights.map(lambda h: [h] * n) | st.lists(_heights, min_size=n, max_size=n))
+    @initialize(
+        board=st.sampled_from(["wristband7", "wristband7", "wristband7", "wristband19"]),
+        seed=st.integers(0, 1000),
+        world=st.sampled_from([(False, 0.0), (False, 0.0), (True, 0.0), (False, 0.05)]),
+    )
+    def boot(self, board, seed, world):
+        contact, spread = world
+        self.world = World(board, seed=seed, contact=contact, spread=spread, host=self.spoil)
+
+    @rule(data=st.data(), ramp_ms=st.sampled_from([0, 0, 30, 500]), duration=_durations)
+    def show(self, data, ramp_ms, duration):
+        n = self.world.bubbles
+        heights = data.draw(_heights.map(lambda h: [h] * n) | st.lists(_heights, min_size=n, max_size=n))
+        self.world.speak()
+        self.world.show(heights, ramp_ms)
+        self.world.run(duration)
+
+    @rule(duration=_durations)
+    def stop(self, duration):
+        self.world.stop()
+        self.world.run(duration)
+
+    @rule(duration=_durations)
+    def vent(self, duration):
+        self.world.vent()
+        self.world.run(duration)
+
+    @rule(duration=_durations, pace=st.sampled_from([1, 2, 20, 60]))
+    def clear(self, duration, pace):
+        for tick in range(round(duration / self.world.board.tick_s)):
+            if not tick % pace:
+                self.world.clear()
+            self.world.tick()
+
+    @rule(failure=st.sampled_from(FAILURES), bubble=st.integers(0, 6), duration=st.sampled_from([0.3, 1.1, 2.0]))
+    def fail(self, failure, bubble, duration):
+        self.world.inject(failure[0], bubble, failure[1])
+        self.world.run(duration)
+
+    @rule()
+    def mend(self):
+        self.world.mend()
+
+    @rule(bubble=st.integers(0, 6), height=_nonsense)
+    def show_what_is_not_allowed(self, bubble, height):
+        heights = [10000] * self.world.bubbles
+        heights[bubble] = height
+        self.world.show(heights, 0)
+        self.world.run(0.1)
+
+    @rule(duration=_durations, speaks=st.booleans())
+    def silence(self, duration, speaks):
+        self.world.fall_silent()
+        self.world.run(duration)
+        if speaks:
             self.world.speak()
-            self.world.show(heights, ramp_ms)
-            self.world.run(duration)
-
-        @rule(duration=_durations)
-        def stop(self, duration):
-            self.world.stop()
-            self.world.run(duration)
-
-        @rule(duration=_durations)
-        def vent(self, duration):
-            self.world.vent()
-            self.world.run(duration)
-
-        @rule(duration=_durations, pace=st.sampled_from([1, 2, 20, 60]))
-        def clear(self, duration, pace):
-            for tick in range(round(duration / self.world.board.tick_s)):
-                if not tick % pace:
-                    self.world.clear()
-                self.world.tick()
-
-        @rule(failure=st.sampled_from(FAILURES), bubble=st.integers(0, 6), duration=st.sampled_from([0.3, 1.1, 2.0]))
-        def fail(self, failure, bubble, duration):
-            self.world.inject(failure[0], bubble, failure[1])
-            self.world.run(duration)
-
-        @rule()
-        def mend(self):
-            self.world.mend()
-
-        @rule(bubble=st.integers(0, 6), height=_nonsense)
-        def show_what_is_not_allowed(self, bubble, height):
-            heights = [10000] * self.world.bubbles
-            heights[bubble] = height
-            self.world.show(heights, 0)
             self.world.run(0.1)
 
-        @rule(duration=_durations, speaks=st.booleans())
-        def silence(self, duration, speaks):
-            self.world.fall_silent()
-            self.world.run(duration)
-            if speaks:
-                self.world.speak()
-                self.world.run(0.1)
+    @rule(pressed=st.booleans(), duration=_durations)
+    def emergency_stop(self, pressed, duration):
+        self.world.press(pressed)
+        self.world.run(duration)
 
-        @rule(pressed=st.booleans(), duration=_durations)
-        def emergency_stop(self, pressed, duration):
-            self.world.press(pressed)
-            self.world.run(duration)
+    @rule(duration=_durations)
+    def power_cut(self, duration):
+        self.world.cut_power()
+        self.world.run(duration)
 
-        @rule(duration=_durations)
-        def power_cut(self, duration):
-            self.world.cut_power()
-            self.world.run(duration)
+    @rule(duration=_durations)
+    def wait(self, duration):
+        self.world.run(duration)
 
-        @rule(duration=_durations)
-        def wait(self, duration):
-            self.world.run(duration)
-
-        def teardown(self):
-            if hasattr(self, "world"):
-                self.world.board.close()
-
-    return Promises
+    def teardown(self):
+        if hasattr(self, "world"):
+            self.world.board.close()
 
 
 def look(scenarios, spoil=None, phases=(Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink)):
     run_state_machine_as_test(
-        machine(spoil),
+        type("Spoiled", (Promises,), {"spoil": staticmethod(spoil)}) if spoil else Promises,
         settings=settings(
             max_examples=scenarios,
             stateful_step_count=STEPS,
