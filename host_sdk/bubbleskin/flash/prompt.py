@@ -1,5 +1,6 @@
 """MicroPython's prompt at the other end of a port, by `mpremote`: scripts and files, and sentences where they fail."""
 
+import ast
 import contextlib
 import errno
 import io
@@ -21,15 +22,13 @@ _ENTER_S = 3.0
 LOOK = """\
 import os, sys
 def _look(path):
-    found = {}
     for entry in os.ilistdir(path):
         name = path + "/" + entry[0]
         if entry[1] & 0x4000:
-            found[name] = None
-            found.update(_look(name))
+            print((name, None))
+            _look(name)
         else:
-            found[name] = _sum(name)
-    return found
+            print((name, _sum(name)))
 def _sum(name):
     import hashlib
     hash, part, size = hashlib.sha256(), bytearray(512), 0
@@ -41,7 +40,10 @@ def _sum(name):
             size += n
             hash.update(part[:n] if n < 512 else part)
 """
-"""Runs on the board: every file below a folder with its size and SHA-256; a folder has None."""
+"""Runs on the board: every file below a folder with its size and SHA-256, a line each; a folder has None.
+
+All of them in one piece would need a large one of a heap that the files before have left in small ones.
+"""
 
 
 class Prompt(SerialTransport):
@@ -102,21 +104,22 @@ class Prompt(SerialTransport):
     def tree(self, path: str) -> dict[str, tuple[int, bytes] | None]:
         """Size and SHA-256 of every file below a folder, None for folders; empty where there is no such folder."""
         try:
-            found: dict[str, tuple[int, bytes] | None] = self._look(f"_look({path!r})")
+            self._learn_to_look()
+            lines = self.run(f"_look({path!r})").splitlines()
         except FileNotFoundError:
             return {}
-        return found
+        return dict(ast.literal_eval(line) for line in lines)
 
     def sum(self, path: str) -> tuple[int, bytes]:
         """Size and SHA-256 of a file."""
-        found: tuple[int, bytes] = self._look(f"_sum({path!r})")
+        self._learn_to_look()
+        found: tuple[int, bytes] = self.value(f"_sum({path!r})")
         return found
 
-    def _look(self, expression: str) -> Any:
+    def _learn_to_look(self) -> None:
         if not self._ready:
             self.run(LOOK)
             self._ready = True
-        return self.value(expression)
 
     def text(self, path: str) -> str:
         """A small file's content, empty where there is none."""
