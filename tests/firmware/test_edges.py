@@ -24,9 +24,13 @@ class LineHal(Hal):
     line = b""
     answers = 0
     wide = 0
+    ticks = 0
     def read_sensors(self, counts):
         for i in range(len(counts)):
             counts[i] = 1000 + 200 * i
+        # The reservoir breathes by 1.6 kPa: one that stands still is not believed, and vents everything.
+        self.ticks = (self.ticks + 1) & 63
+        counts[-1] = 2520 + 2 * abs(self.ticks - 32)
     def write_outputs(self, pulses, pump, dump):
         for i in range(len(pulses)):
             if pulses[i] > {tick_us}:
