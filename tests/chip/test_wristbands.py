@@ -83,6 +83,7 @@ def test_the_emergency_stop_vents_within_a_tick(emulated):
     with pytest.raises(bs.DeviceRefused):
         skin.show(DOME["wristband7"])
     board.inject("estop", value=0)
+    skin.sleep(2 * board.tick_s)  # an emergency stop that is pressed cannot be acknowledged
     skin.clear_faults()
     skin.show(DOME["wristband7"], wait=False)
     skin.sleep(3 * board.tick_s)
