@@ -94,7 +94,8 @@ def hostile(board, seed, ticks):
             bubble = chance.below(n)
             heights = sorted({1 + chance.below(13999) for _ in range(1 + chance.below(48))})
             pressures = [0, 42000, chance.below(42001)]
-            knots = [[height, chance.one_of(pressures)] for height in [*heights, 14000 + chance.below(2001)]]
+            knots = [[height, chance.one_of(pressures)] for height in heights]
+            knots.append([14000 + chance.below(2001), 20000 + chance.below(20001)])
             tables[bubble] = knots
             requests.append([tick, "TABLE_WRITE", [bubble, 0, len(knots)], knots])
         elif tick % 150 == 21:

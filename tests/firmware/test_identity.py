@@ -66,7 +66,7 @@ def script(n):
     def shape(low, high):
         return [chance.randrange(low, high) for _ in range(n)]
 
-    snaps_through = [(5000, 0), (7000, 24000), (8000, 23500), (9000, 25000), (14000, 41000)]
+    snaps_through = [(5000, 0), (7000, 24000), (8000, 23500), (9000, 25000), (14000, 40000)]
     tables = zlib.crc32(
         b"".join(np.array(table, "<u2").tobytes() for table in [KNOTS, snaps_through, *[KNOTS] * (n - 2)])
     )
@@ -174,7 +174,11 @@ def hostile(seed, board, ticks):
             heights = sorted(chance.sample(range(1, 14000), chance.randrange(1, 50)))
             last = chance.randrange(14000, 16001)
             tables[bubble] = [
-                (height, chance.choice([0, 42000, chance.randrange(42001)])) for height in [*heights, last]
+                (
+                    height,
+                    chance.choice([0, 42000, chance.randrange(42001)]) if height < last else chance.randrange(40001),
+                )
+                for height in [*heights, last]
             ]
             link += ask("TABLE_WRITE", (bubble, 0, len(tables[bubble])), tables[bubble])
         elif tick % 100 == 1:

@@ -156,8 +156,9 @@ def test_a_newer_firmwares_mode_and_status_are_unknown_and_no_failure():
             "The wristband refused SHOW: 6 entries for its 7 bubbles; send one per bubble.",
         ),
         (
-            error(errors.BAD_TABLE, request=messages.TABLE_COMMIT, element=4, asked=63, high=42000),
-            "The wristband refused the table of bubble 4 at knot 63: heights must rise to the board's greatest height "
+            error(errors.BAD_TABLE, request=messages.TABLE_COMMIT, element=4, asked=63, low=40387, high=42000),
+            "The wristband refused the table of bubble 4 at knot 63: heights must rise to the board's greatest height, "
+            "where pressure may be 40387 Pa (more, and it would take more air than a bubble of this board may have), "
             "and pressures stay within 42000 Pa.",
         ),
         (

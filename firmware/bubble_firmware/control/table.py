@@ -8,12 +8,29 @@ from array import array
 from bubble_firmware.control.nominal import KNOTS as NOMINAL
 from bubble_protocol.buffers import copy
 from bubble_protocol.crc import crc32_on
-from bubble_protocol.mpy_compat import const
+from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.steps import copy_word
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+# [constants] bubble_firmware.control.state_layout: used
+_ATMOSPHERE = const(101325)
+# [end of constants]
 
 KNOTS_MAX = const(64)
 KNOT_BYTES = const(4)  # a step of `range` that is no constant makes an object
 HEIGHT_MAX_UM = 16000  # beyond, the air of a bubble no longer fits the arithmetic of `bubbles`
+
+
+def pressure_top(board: "ModuleType") -> int:
+    """The greatest gauge pressure, Pa, that a table may have at the board's greatest height: more, and its air is too much.
+
+    AIR_MAX_UJ = (p + atmosphere) V, V of sphere and line, as `curve` reckons it.
+    """
+    square = board.HEIGHT_MAX_UM * board.HEIGHT_MAX_UM >> 12
+    volume = ((square * board.HEIGHT_MAX_UM >> 12) * 2303 >> 12) + 64 * board.DEAD_VOLUME_MM3
+    return (board.AIR_MAX_UJ * 4000 // volume << 4) - _ATMOSPHERE
 
 
 class Tables:
@@ -72,14 +89,19 @@ class Tables:
         values[at] = least
         values[at + 1] = most
 
-    def first_flaw(self, height_max_um: int, pressure_max_pa: int) -> int:
-        """Where the received set cannot be used: bubble * KNOTS_MAX + knot, or -1 where all is well.
+    def first_flaw(self, board: "ModuleType") -> int:
+        """Where the received set cannot be used on `board`: bubble * KNOTS_MAX + knot, or -1 where all is well.
 
-        Heights must rise, the last must reach `height_max_um`, pressures must stay within `pressure_max_pa`.
+        Heights must rise and the last must reach the board's greatest. Pressures must stay within the board's, and at its
+        greatest height within what its air allows, see `pressure_top`.
         """
+        height_max_um = board.HEIGHT_MAX_UM
+        pressure_max_pa = board.PRESSURE_MAX_PA
+        pressure_top_pa = pressure_top(board)
         received = self._received
         for bubble in range(self.bubbles):
             before = 0
+            lower = 0
             size = self._received_sizes[bubble]
             for index in range(size):
                 at = (bubble * KNOTS_MAX + index) * KNOT_BYTES
@@ -87,7 +109,16 @@ class Tables:
                 pressure = received[at + 2] | received[at + 3] << 8
                 if height <= before or pressure > pressure_max_pa:
                     return bubble * KNOTS_MAX + index
+                if before < height_max_um <= height:
+                    rise = (
+                        (pressure - lower) * (height_max_um - before) // (height - before)
+                        if before
+                        else pressure - lower
+                    )
+                    if lower + rise > pressure_top_pa:
+                        return bubble * KNOTS_MAX + index
                 before = height
+                lower = pressure
             if before < height_max_um or before > HEIGHT_MAX_UM:
                 return bubble * KNOTS_MAX + size - 1
         return -1

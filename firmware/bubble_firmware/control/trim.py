@@ -27,8 +27,8 @@ class Trim:
         dead_us = board.TICK_US // 2
         gain = flow_gain(board)
         self.nominal = array("i", (board.SENSOR_ZERO, board.VALVE_OPENS_US, board.VALVE_CLOSES_US, gain))
-        self.low = array("i", (max(board.SENSOR_ZERO - off, board.COUNT_LOW + 1), 0, 0, gain // 4))
-        self.high = array("i", (board.SENSOR_ZERO + off, dead_us, dead_us, min(4 * gain, 65535)))
+        self.low = array("i", (max(board.SENSOR_ZERO - off, board.COUNT_LOW + 1), 0, 0, gain * 3 // 4))
+        self.high = array("i", (board.SENSOR_ZERO + off, dead_us, dead_us, min(gain * 4 // 3, 65535)))
 
     def first_invalid(self, values: "array[int]") -> int:
         """Where in `values` the first number stands that the board does not allow, -1 where there is none."""

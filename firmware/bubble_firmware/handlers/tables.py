@@ -1,6 +1,6 @@
 """Requests about the tables of heights and pressures: TABLE_WRITE, TABLE_COMMIT, TABLE_READ."""
 
-from bubble_firmware.control.table import KNOTS_MAX
+from bubble_firmware.control.table import KNOTS_MAX, pressure_top
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.steps import copy_word, same_word
@@ -83,10 +83,10 @@ class TableHandlers(Handlers):
         tables = self._tables
         board = self._board
         values = self._reply.values
-        invalid = tables.first_flaw(board.HEIGHT_MAX_UM, board.PRESSURE_MAX_PA)
+        invalid = tables.first_flaw(board)
         if invalid >= 0:
             bubble, knot = invalid // KNOTS_MAX, invalid % KNOTS_MAX
-            self._reply.refuse(_BAD_TABLE, 0, bubble, knot, 0, board.PRESSURE_MAX_PA)
+            self._reply.refuse(_BAD_TABLE, 0, bubble, knot, pressure_top(board), board.PRESSURE_MAX_PA)
             return
         tables.check_received()
         if not same_word(values, _COMMIT_CRC, tables.received_crc, 0):

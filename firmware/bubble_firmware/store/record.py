@@ -115,7 +115,6 @@ class Content:
 
     def _take_tables(self, data: bytearray, at: int, end: int) -> bool:
         tables = self.tables
-        board = self._board
         sizes = at
         at += tables.bubbles
         for bubble in range(tables.bubbles):
@@ -126,7 +125,7 @@ class Content:
             for index in range(size):
                 tables.write_knot(bubble, index, get16(data, at), get16(data, at + 2))
                 at += KNOT_BYTES
-        return tables.first_flaw(board.HEIGHT_MAX_UM, board.PRESSURE_MAX_PA) < 0
+        return tables.first_flaw(self._board) < 0
 
     def _take_settings(self, data: bytearray, at: int, size: int) -> bool:
         settings = self._settings

@@ -7,6 +7,7 @@ from types import ModuleType
 from typing import Any
 
 from bubble_firmware.control.nominal import KNOTS
+from bubble_firmware.control.table import pressure_top
 from bubble_firmware.drivers import clock, pca9685
 from bubbleskin.boards.fields import EXPANDER_FIELDS, FIELDS, GPIOS, NEIGHBOUR, Field
 from bubbleskin.errors import InvalidInput
@@ -110,6 +111,11 @@ def _check_limits(data: ModuleType) -> None:
         raise _FlawError(
             f"has PRESSURE_MAX_PA = {data.PRESSURE_MAX_PA}, and HEIGHT_MAX_UM = {data.HEIGHT_MAX_UM} takes {needed} Pa; "
             "lower the height or raise the pressure"
+        )
+    if pressure_top(data) <= needed:
+        raise _FlawError(
+            f"has AIR_MAX_UJ = {data.AIR_MAX_UJ}, and HEIGHT_MAX_UM = {data.HEIGHT_MAX_UM} at {needed} Pa takes more; "
+            "lower the height or raise the air"
         )
     for name in ("VALVE_OPENS_US", "VALVE_CLOSES_US"):
         if getattr(data, name) > data.TICK_US // 2:

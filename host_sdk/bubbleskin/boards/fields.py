@@ -46,6 +46,12 @@ FIELDS = (
     Field("HEIGHT_REST_UM", "µm", _to(1000, KNOTS[-1][0]), "height of a bubble without pressure"),
     Field("HEIGHT_MAX_UM", "µm", _to(1000, KNOTS[-1][0]), "the greatest height that may be asked"),
     Field("PRESSURE_MAX_PA", "Pa", _to(1000, 65535), "gauge pressure at which a bubble is vented"),
+    Field(
+        "AIR_MAX_UJ",
+        "µJ",
+        _to(1000, 260000),
+        "air in a bubble and its line that a table may ask for, at the greatest height",
+    ),
     Field("FILL_MAX_US", "µs", _to(1000, 2000000), "longest a fill valve may stay open at a time"),
     Field("SUPPLY_PA", "Pa", _to(1000, RELIEF_PA), "pressure that the pump keeps in the reservoir"),
     Field("SUPPLY_MAX_PA", "Pa", _to(1000, RELIEF_PA), "pressure at which the dump valve opens"),

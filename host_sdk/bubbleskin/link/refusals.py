@@ -70,7 +70,8 @@ _SENTENCES: dict[int, Callable[[Message], str]] = {
     errors.NOT_VENTED: _not_vented,
     errors.BAD_TABLE: lambda error: (
         f"The wristband refused the table of bubble {error['element']} at knot {error['asked']}: heights must rise to the "
-        f"board's greatest height and pressures stay within {error['high']} Pa."
+        f"board's greatest height, where pressure may be {error['low']} Pa (more, and it would take more air than a bubble "
+        f"of this board may have), and pressures stay within {error['high']} Pa."
     ),
     errors.FAULTED: lambda error: (
         f"The wristband failed at {name_of(error['request'])} and vents. `bubbleskin info` counts its exceptions."

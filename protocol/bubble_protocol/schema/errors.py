@@ -13,7 +13,12 @@ ERRORS = (
     (WRONG_LENGTH, "wrong_length", "the payload is too short or too long: asked bytes, low to high allowed"),
     (OUT_OF_RANGE, "out_of_range", "a field is outside its limits: field, element, asked, low, high"),
     (WRONG_COUNT, "wrong_count", "not one entry per bubble: asked entries, low = high = bubbles"),
-    (BAD_TABLE, "bad_table", "a table is incomplete or its heights do not rise: element is the bubble, asked the knot"),
+    (
+        BAD_TABLE,
+        "bad_table",
+        "a table is incomplete, its heights do not rise, or it asks for more pressure or air than the board allows: element is "
+        "the bubble, asked the knot, high the greatest pressure, low the greatest at the greatest height, Pa",
+    ),
     (BAD_CRC, "bad_crc", "the tables received are not the tables sent"),
     (NO_COMMON_PROTOCOL, "no_common_protocol", "asked is the host's newest, low to high the device's"),
     (FAULTED, "faulted", "the device failed at this request and vents"),

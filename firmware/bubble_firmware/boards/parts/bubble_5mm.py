@@ -4,6 +4,7 @@
 HEIGHT_REST_UM = 5000
 HEIGHT_MAX_UM = 14000
 PRESSURE_MAX_PA = 42000  # 14 mm takes 34 kPa, air in motion 5 kPa more
+AIR_MAX_UJ = 232000  # in bubble and line at HEIGHT_MAX_UM, by its table: 40.4 kPa there, a sheet half as stiff again
 FILL_MAX_US = 1000000  # longest a fill valve may stay open at a time; 5 to 14 mm takes 0.4 s
 SUPPLY_PA = 60000
 SUPPLY_MAX_PA = 75000
