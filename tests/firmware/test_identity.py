@@ -171,8 +171,8 @@ def hostile(seed, board, ticks):
         link = b"" if tick else host.hello
         if tick % 100 == 0:
             bubble = chance.randrange(n)
-            heights = sorted(chance.sample(range(1, 14000), chance.randrange(1, 50)))
-            last = chance.randrange(14000, 16001)
+            heights = sorted(chance.sample(range(1, 13000), chance.randrange(1, 50)))
+            last = chance.choice([14000, 14000, 16000])
             tables[bubble] = [
                 (
                     height,

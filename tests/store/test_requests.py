@@ -136,7 +136,7 @@ def test_figures_are_used_kept_and_checked(skin):
     for name, value, allowed in (
         ("zero", 300, "72 to 248"),
         ("opens_us", 2501, "0 to 2500"),
-        ("flow_gain", 9, "996 to 15936"),
+        ("flow_gain", 9, "2988 to 5312"),
     ):
         values = getattr(made_with, name).copy()
         values[3] = value

@@ -51,6 +51,7 @@ class Hal:
 
     def __init__(self, board: "ModuleType"):
         self.board = board
+        self._noise = 0
 
     # Time.
 
@@ -70,9 +71,10 @@ class Hal:
     def read_sensors(self, counts: "array[int]") -> None:
         """Fill in one count for each bubble, then the supply's; ABSENT where no chip answers."""
         board = self.board
+        self._noise ^= 1  # a sensor without any is not believed
         for index in range(board.BUBBLES):
-            counts[index] = board.SENSOR_ZERO
-        counts[board.BUBBLES] = board.SUPPLY_ZERO + board.SUPPLY_PA // board.SUPPLY_PA_PER_COUNT
+            counts[index] = board.SENSOR_ZERO + self._noise
+        counts[board.BUBBLES] = board.SUPPLY_ZERO + board.SUPPLY_PA // board.SUPPLY_PA_PER_COUNT + self._noise
 
     def write_outputs(self, pulses: "array[int]", pump: int, dump: int) -> None:
         """Set what the next period does.
