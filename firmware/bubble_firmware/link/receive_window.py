@@ -55,9 +55,8 @@ class ReceiveWindow:
         self.key = bytearray(CRC)
         self.expected = 1  # the number whose turn it is, 16 bits
         self.early = 0  # how many requests wait for their turn
-        self.replies = [
-            bytearray(FRAME_MAX) for _ in range(_REPLIES_KEPT)
-        ]  # of number n in place n modulo _REPLIES_KEPT
+        # The reply to request n stands in place n modulo _REPLIES_KEPT.
+        self.replies = [bytearray(FRAME_MAX) for _ in range(_REPLIES_KEPT)]
         self.lengths = array("H", bytearray(2 * _REPLIES_KEPT))  # 0: never answered, overtaken
         self._identity = bytearray(boot_id.to_bytes(4, "little") + NO_KEY)
         self._sessions = bytearray(_SESSIONS)

@@ -13,9 +13,8 @@ CAPABILITIES = (
 
 TICKS_WRAP = 1 << 30  # device time counts up to here and goes on from 0: after 62 days at 5 ms. No integer becomes long
 
-REPLIES_KEPT = (
-    16  # by the device, twice its window: STOP and VENT may be so far ahead of the oldest request without an answer
-)
+# By the device, twice its window: STOP and VENT may be so far ahead of the oldest request without an answer.
+REPLIES_KEPT = 16
 
 # What RESTART leads to.
 FIRMWARE, BOOT_LOADER, PROMPT = range(3)
