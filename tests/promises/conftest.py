@@ -1,0 +1,215 @@
+"""A simulated board, whatever a host or the world does to it, and the promises of docs/safety.md checked in every tick.
+
+What judges knows the plant's truth, what the valves are told, and numbers of docs/safety.md written down once more here. Of the
+firmware it believes only which faults it tells.
+"""
+
+import numpy as np
+import pytest
+
+from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
+from bubbleskin.link import message as wire
+from bubbleskin.sim import SimulatedBoard
+
+PRESSURE_LIMIT_PA = 42_000.0
+PRESSURE_MARGIN_PA = 1_500.0
+"""What is on its way when the limit is seen: two ticks of an open fill valve, and the sensor's noise."""
+HEIGHT_LIMIT_MM = 14.0
+HEIGHT_MARGIN_MM = 0.4
+RESERVOIR_LIMIT_PA = 76_000.0
+"""Where the dump valve opens, and a kilopascal."""
+RELIEF_LIMIT_PA = 81_000.0
+"""What the relief valve holds, where the reservoir's sensor lies in a way that no one can see."""
+VENT_AFTER_S = 1.0
+"""Without a valid frame."""
+FILL_AT_MOST_S = 1.0
+"""A fill valve at a stretch."""
+ISOLATED_AT_LEAST_S = 1.0
+PING_S = 0.1
+BUDGET = 128  # a fault of nobody: it is used up
+ESTOP = 1
+CLEAR_TICKS = 3
+"""Within which a CLEAR has been handled, and faults that came up before that are acknowledged."""
+SESSION = 4711
+
+
+SUBTLE = ("supply_bias", "supply_flat")
+
+
+class BrokenPromiseError(AssertionError):
+    """A promise of docs/safety.md that was not kept."""
+
+
+class World:
+    """A board, its host and its failures; `run` lets time pass and judges every tick: `World.Broken` where a promise is."""
+
+    Broken = BrokenPromiseError
+
+    def __init__(self, board="wristband7", *, seed=0, contact=False, spread=0.0, host=None):
+        self.board = SimulatedBoard(board, seed=seed, contact=contact, spread=spread)
+        self.alone = not contact
+        self.matched = not spread
+        self.host = host or (lambda firmware: None)
+        self.failing = set()
+        self.ill = set()  # bubbles that ever were: a sensor that was off leaves wrong estimates
+        self.telling = True
+        self.pressed = False
+        self.silent_s = 0.0
+        self.fill_s = np.zeros(self.bubbles)
+        self.isolated_s = np.zeros(self.bubbles)
+        self.supply_is_ill = self.supply_lies = False
+        self.cut_power(first=True)
+
+    @property
+    def bubbles(self):
+        return self.board.data.BUBBLES
+
+    # What the host does.
+
+    def send(self, name, fixed=(), repeated=()):
+        """A request in its turn, while the host tells anything at all."""
+        if self.telling:
+            self.number += 1
+            self.board.to_device += wire.encode(name, self.number, fixed, repeated, self.key)
+
+    def show(self, heights_um, ramp_ms):
+        self.send("SHOW", (ramp_ms,), [(int(height),) for height in heights_um])
+
+    def stop(self):
+        self.send("STOP")
+
+    def vent(self):
+        self.send("VENT")
+
+    def clear(self):
+        self.send("CLEAR")
+        if self.telling:
+            self.clearing = CLEAR_TICKS
+
+    def fall_silent(self):
+        self.telling = False
+
+    def speak(self):
+        self.telling = True
+
+    # What happens to the board.
+
+    def inject(self, failure, bubble, value):
+        self.failing.add((failure, bubble))
+        self.ill.add(bubble)
+        self.board.inject(failure, bubble, value)
+
+    def inject_supply(self, failure, value):
+        self.failing.add((failure, 0))
+        self.supply_is_ill = True
+        self.supply_lies |= failure in SUBTLE
+        self.board.inject(failure, 0, value)
+
+    def mend(self):
+        """Whatever fails; a bubble that was ill may be taken for ill for the rest of the time."""
+        for failure, bubble in self.failing:
+            self.board.inject(failure, bubble, 0.0)
+        self.failing.clear()
+
+    def press(self, pressed):
+        """The emergency stop."""
+        self.pressed = pressed
+        firmware = self.board.firmware
+        firmware.active_faults = firmware.active_faults | ESTOP if pressed else firmware.active_faults & ~ESTOP
+
+    def cut_power(self, first=False):
+        """Power fails and comes back; the host opens its session anew."""
+        if not first:
+            self.board.reset()
+        self.host(self.board.firmware.app)
+        self.faults = (0,) * self.bubbles
+        self.unacknowledged = set()  # bubbles with a fault of which nobody has heard
+        self.clearing = 0
+        self.isolated_s[:] = 0.0
+        self.number = 0
+        self.key = wire.session_key(self.board.firmware.boot_id, SESSION)
+        self.board.to_device += wire.encode("HELLO", 0, (PROTOCOL_MIN, PROTOCOL_MAX, SESSION))
+        self.silent_s = 0.0
+        self.tick()
+
+    # Time, and what must hold.
+
+    def run(self, seconds):
+        for _ in range(round(seconds / self.board.tick_s)):
+            self.tick()
+
+    def tick(self):
+        """One period. The host pings while it speaks."""
+        board = self.board
+        tick_s = board.tick_s
+        ticks = round(board.time / tick_s)
+        if self.telling and not ticks % round(PING_S / tick_s):
+            board.to_device += wire.encode("PING", 0, (0,), (), self.key)
+        self.silent_s = 0.0 if board.to_device else self.silent_s + tick_s
+        before = board.pulses.copy()  # they act in the period that this tick ends
+        board.tick()
+        board.from_device.clear()
+        self.judge(before)
+
+    def judge(self, acting):
+        """Every promise, after one tick: `acting` are the seconds of fill and vent valves in the period that has passed."""
+        board, plant = self.board, self.board.plant
+        decided = board.pulses
+        told = tuple(board.firmware.app.bubbles.faults(bubble) for bubble in range(self.bubbles))
+        self.require(
+            plant.pressure_pa.max() <= PRESSURE_LIMIT_PA + PRESSURE_MARGIN_PA,
+            "pressure",
+            f"{plant.pressure_pa.max() / 1e3:.1f} kPa in bubble {int(plant.pressure_pa.argmax())}",
+        )
+        if self.alone and self.matched:
+            self.require(
+                plant.height_mm.max() <= HEIGHT_LIMIT_MM + HEIGHT_MARGIN_MM,
+                "height",
+                f"{plant.height_mm.max():.2f} mm in bubble {int(plant.height_mm.argmax())}",
+            )
+        most = RELIEF_LIMIT_PA if self.supply_lies else RESERVOIR_LIMIT_PA
+        self.require(plant.supply_pa <= most, "reservoir", f"{plant.supply_pa / 1e3:.1f} kPa")
+        vented = (decided[:, 0] == 0.0) & (decided[:, 1] >= board.tick_s)
+        if self.silent_s > VENT_AFTER_S + board.tick_s:
+            self.require(vented.all(), "silence", f"silent for {self.silent_s:.2f} s, not vented")
+        if self.pressed:
+            self.require(vented.all(), "emergency stop", "pressed, not vented")
+        self.fill_s = np.where(acting[:, 0] >= board.tick_s - 1e-9, self.fill_s + board.tick_s, 0.0)
+        self.require(
+            self.fill_s.max() <= FILL_AT_MOST_S + 2 * board.tick_s, "on-time", f"open for {self.fill_s.max():.2f} s"
+        )
+        self.judge_faults(told, vented)
+
+    def judge_faults(self, told, vented):
+        """What the firmware tells of each bubble's faults, and whether its valves are set to empty it."""
+        if self.clearing:
+            self.clearing -= 1
+            self.unacknowledged.clear()
+        for bubble, (was, is_now) in enumerate(zip(self.faults, told, strict=True)):
+            if was & ~is_now:
+                self.require(
+                    bubble not in self.unacknowledged, "latching", f"fault {was} of bubble {bubble} is gone by itself"
+                )
+                self.require(
+                    self.isolated_s[bubble] >= ISOLATED_AT_LEAST_S - 1e-6,
+                    "isolation",
+                    f"bubble {bubble} was isolated for {self.isolated_s[bubble]:.2f} s",
+                )
+            if is_now & ~was and not self.clearing:
+                self.unacknowledged.add(bubble)
+            if is_now:
+                self.require(vented[bubble], "isolation", f"bubble {bubble} has fault {is_now} and is not vented")
+            self.isolated_s[bubble] = self.isolated_s[bubble] + self.board.tick_s if is_now else 0.0
+            if self.alone and self.matched and bubble not in self.ill and not self.supply_is_ill:
+                self.require(not is_now & ~BUDGET, "only the ill", f"bubble {bubble} is well and has fault {is_now}")
+        self.faults = told
+
+    def require(self, kept, promise, what):
+        if not kept:
+            raise BrokenPromiseError(f"{promise}: {what}, {self.board.time:.3f} s after the start")
+
+
+@pytest.fixture(scope="session")
+def world():
+    """The class."""
+    return World
