@@ -11,6 +11,31 @@ from bubbleskin.errors import BubbleskinError
 from bubbleskin.sim.micropython import HEAP, source_path
 from bubbleskin.toolchain.interpreter import find_micropython
 
+NEEDS_MORE_THAN_CI_HAS = ("a full disk is simulated by Linux",)
+"""Reasons for which a test may be skipped where everything it needs should be there; any other is a failure in CI."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport():
+    """No test is skipped in CI without anybody seeing it."""
+    return _judged((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report():
+    """Nor is a whole module."""
+    return _judged((yield))
+
+
+def _judged(report):
+    if os.environ.get("CI") and report.skipped and not hasattr(report, "wasxfail"):
+        reason = str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr)
+        if not any(allowed in reason for allowed in NEEDS_MORE_THAN_CI_HAS):
+            report.outcome = "failed"
+            report.longrepr = f"In CI nothing may be skipped, but: {reason}"
+    return report
+
+
 # The same examples on every run, and no deadline: a busy machine is not a failure.
 settings.register_profile("house", deadline=None, derandomize=True)
 settings.load_profile("house")
