@@ -16,6 +16,8 @@ PRESSURE_MARGIN_PA = 1_500.0
 """What is on its way when the limit is seen: two ticks of an open fill valve, and the sensor's noise."""
 HEIGHT_LIMIT_MM = 14.0
 HEIGHT_MARGIN_MM = 0.4
+STUCK_LIMIT_MM, STUCK_FOR_S = 15.6, 1.6
+"""Of a bubble whose fill valve sticks open as it gets there, and for how long it may be above the limit at a stretch."""
 RESERVOIR_LIMIT_PA = 76_000.0
 """Where the dump valve opens, and a kilopascal."""
 RELIEF_LIMIT_PA = 81_000.0
@@ -57,7 +59,8 @@ class World:
         self.silent_s = 0.0
         self.fill_s = np.zeros(self.bubbles)
         self.isolated_s = np.zeros(self.bubbles)
-        self.supply_is_ill = self.supply_lies = False
+        self.supply_is_ill = self.supply_lies = self.fill_sticks = False
+        self.high_s = 0.0
         self.cut_power(first=True)
 
     @property
@@ -97,6 +100,7 @@ class World:
     def inject(self, failure, bubble, value):
         self.failing.add((failure, bubble))
         self.ill.add(bubble)
+        self.fill_sticks |= failure == "fill_stuck" and value > 0.0
         self.board.inject(failure, bubble, value)
 
     def inject_supply(self, failure, value):
@@ -162,11 +166,7 @@ class World:
             f"{plant.pressure_pa.max() / 1e3:.1f} kPa in bubble {int(plant.pressure_pa.argmax())}",
         )
         if self.alone and self.matched:
-            self.require(
-                plant.height_mm.max() <= HEIGHT_LIMIT_MM + HEIGHT_MARGIN_MM,
-                "height",
-                f"{plant.height_mm.max():.2f} mm in bubble {int(plant.height_mm.argmax())}",
-            )
+            self.judge_height(plant.height_mm)
         most = RELIEF_LIMIT_PA if self.supply_lies else RESERVOIR_LIMIT_PA
         self.require(plant.supply_pa <= most, "reservoir", f"{plant.supply_pa / 1e3:.1f} kPa")
         vented = (decided[:, 0] == 0.0) & (decided[:, 1] >= board.tick_s)
@@ -179,6 +179,17 @@ class World:
             self.fill_s.max() <= FILL_AT_MOST_S + 2 * board.tick_s, "on-time", f"open for {self.fill_s.max():.2f} s"
         )
         self.judge_faults(told, vented)
+
+    def judge_height(self, height_mm):
+        """True heights of bubbles that nobody lifts, on rubber as the tables have it."""
+        most = HEIGHT_LIMIT_MM + HEIGHT_MARGIN_MM
+        self.high_s = self.high_s + self.board.tick_s if height_mm.max() > most else 0.0
+        self.require(
+            height_mm.max() <= (STUCK_LIMIT_MM if self.fill_sticks else most),
+            "height",
+            f"{height_mm.max():.2f} mm in bubble {int(height_mm.argmax())}",
+        )
+        self.require(self.high_s <= STUCK_FOR_S, "height", f"{height_mm.max():.2f} mm for {self.high_s:.2f} s")
 
     def judge_faults(self, told, vented):
         """What the firmware tells of each bubble's faults, and whether its valves are set to empty it."""

@@ -207,6 +207,25 @@ def test_a_firmware_without_the_rule_is_found(promise, world):
         look(world, 400, CONTROLS[promise], phases=(Phase.generate,))
 
 
+OVERFILLED = 128
+
+
+@pytest.mark.parametrize("board", ["wristband7", "wristband19"])
+@pytest.mark.parametrize("ramp_ms", [0, 500])
+@pytest.mark.parametrize("after_s", [0.02, 0.34, 0.5])
+def test_a_fill_valve_that_sticks_open_on_the_way_up_empties_the_reservoir(board, ramp_ms, after_s, world):
+    """It is closed by nobody: its bubble passes the limit, and no vent valve takes away as much as it brings."""
+    world = world(board)
+    world.run(0.3)
+    world.show([13700, *[5000] * (world.bubbles - 1)], ramp_ms)
+    world.run(after_s)
+    world.inject("fill_stuck", 0, 1.0)
+    world.run(3.0)
+    assert world.board.firmware.app.faults.board == OVERFILLED
+    assert world.board.plant.supply_pa < 1e3
+    assert world.board.plant.height_mm[0] < 5.1
+
+
 def test_a_fill_valve_that_stays_open_is_found(world):
     """Judged alone: a firmware that leaves one open breaks the promise of height long before."""
     world = world()

@@ -77,7 +77,8 @@ _PREVIOUS_SETTLING_US = const(25)
 _PREVIOUS_FLOW = const(26)
 _PREVIOUS_FILL_US = const(27)
 _PREVIOUS_VENT_US = const(28)
-_WATCH_WORDS = const(29)
+_EMPTYING_TICKS = const(29)
+_WATCH_WORDS = const(30)
 _LOSS_MAX = const(0)
 _FROZEN_MAX = const(1)
 _CLOSED_WINDOW = const(2)
@@ -108,6 +109,8 @@ _FLAT_PA = const(1000)  # below it a vented bubble is flat
 _VENTED_PA = const(3000)  # below it a vented line need not fall
 _STALL_FALL_PA = const(1000)  # by which it must fall otherwise
 _OVERFILLED_PA = const(12000)  # 5.8 mm: more in a vented bubble, and the supply is shut down for all
+_HIGH_AND_VENTED_PA = const(30000)  # 13 mm: too high to ask whether it gets air or only keeps it
+_EMPTY_AFTER = const(3)  # times STALL_MAX, 0.9 s: an open vent takes half of that to empty the greatest bubble
 
 
 @micropython.viper
@@ -153,6 +156,7 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
                 found |= _MOVING_BUBBLE
             watch[_STALL_PA] = pressure
             watch[_STALL_TICKS] = 0
+            watch[_EMPTYING_TICKS] = 0
         else:
             # Vented: the pressure falls, or is gone.
             watch[_LOW_PA] = pressure
@@ -172,6 +176,18 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
                     faults |= _VALVE_STUCK
                     if watch[_INFLOW] and pressure > _OVERFILLED_PA:
                         found |= _OVERFILLED_BUBBLE
+
+            # One that loses pressure through its vent and is not empty in time gets air. Whether a high one that loses none
+            # gets some, or only keeps its own, cannot be told: the supply is shut down for it, too.
+            if pressure <= _OVERFILLED_PA or row[_LOST_TICKS]:
+                watch[_EMPTYING_TICKS] = 0
+            else:
+                watch[_EMPTYING_TICKS] = watch[_EMPTYING_TICKS] + 1
+                overdue = watch[_EMPTYING_TICKS] - _EMPTY_AFTER * limits[_STALL_MAX]
+                if overdue >= 0 and (pressure > _HIGH_AND_VENTED_PA or faults & _VALVE_STUCK == 0):
+                    watch[_INFLOW] = 1
+                    faults |= _VALVE_STUCK
+                    found |= _OVERFILLED_BUBBLE
         row[_FAULTS] = faults
         n -= 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)

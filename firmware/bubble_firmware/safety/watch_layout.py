@@ -42,7 +42,8 @@ PREVIOUS_SETTLING_US = const(25)
 PREVIOUS_FLOW = const(26)
 PREVIOUS_FILL_US = const(27)
 PREVIOUS_VENT_US = const(28)
-WATCH_WORDS = const(29)
+EMPTYING_TICKS = const(29)  # for which it has been vented and still has the pressure of a filled bubble
+WATCH_WORDS = const(30)
 
 # The board's limits.
 LOSS_MAX = const(0)  # µJ in a tick that may get lost
