@@ -5,8 +5,8 @@ import pytest
 
 import bubbleskin as bs
 from bubbleskin import boards
-from bubbleskin.sim.board import make_plant
 from bubbleskin.sim.plant import SUBSTEP, Plant, PlantParameters
+from bubbleskin.sim.recipe import make_plant
 
 FLAT = 5.0
 TALL = 12.0

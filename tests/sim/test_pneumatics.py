@@ -51,10 +51,10 @@ def test_tube_flow_is_the_volume_flow_at_mean_pressure():
 
 
 def test_the_pump_falls_linearly_to_its_stall_and_never_sucks():
-    free = pn.pump_flow(0.0, 1.0, 5e-5, 120e3)
+    free = pn.pump_flow(0.0, 1.0, 5e-5, 120e3, ATMOSPHERE)
     assert free == pytest.approx(101325 * 5e-5)
-    assert pn.pump_flow(60e3, 0.5, 5e-5, 120e3) == pytest.approx(free / 4)
-    assert pn.pump_flow(120e3, 1.0, 5e-5, 120e3) == pn.pump_flow(150e3, 1.0, 5e-5, 120e3) == 0.0
+    assert pn.pump_flow(60e3, 0.5, 5e-5, 120e3, ATMOSPHERE) == pytest.approx(free / 4)
+    assert pn.pump_flow(120e3, 1.0, 5e-5, 120e3, ATMOSPHERE) == pn.pump_flow(150e3, 1.0, 5e-5, 120e3, ATMOSPHERE) == 0.0
 
 
 OPENING, CLOSING = 1.2e-3, 1.0e-3

@@ -4,29 +4,35 @@ import math
 from abc import ABC, abstractmethod
 from array import array
 from pathlib import Path
-from types import ModuleType
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bubble_firmware.hal.lockstep import LINK_IN
 from bubbleskin import boards
-from bubbleskin.contact.model import CompliantContact
 from bubbleskin.errors import InvalidInput
-from bubbleskin.layout import Layout
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
-from bubbleskin.sim.plant import Plant, PlantParameters
+from bubbleskin.sim.recipe import PlantOptions, make_plant
 
 
 class Simulated(ABC):
     """A simulated wristband in virtual time: it moves only when it is stepped, and the same calls give the same bytes.
 
-    What the link, the simulator's server and a script need of one, whatever runs its firmware. `board`, `seed`, `spread`
-    and `contact` are those of `SimulatedBoard`.
+    What the link, the simulator's server and a script need of one, whatever runs its firmware. `board`, `seed`, `spread`,
+    `contact` and `options` are those of `SimulatedBoard`.
     """
 
-    def __init__(self, board: str | Path, *, seed: int = 0, spread: float = 0.0, contact: bool = True):
+    def __init__(
+        self,
+        board: str | Path,
+        *,
+        seed: int = 0,
+        spread: float = 0.0,
+        contact: bool = True,
+        **options: Unpack[PlantOptions],
+    ):
         self.data = boards.load(board)
         """The board's file."""
         if not (math.isfinite(spread) and 0 <= spread <= 0.5):
@@ -36,7 +42,7 @@ class Simulated(ABC):
         self.name: str = self.data.NAME
         self.tick_s: float = self.data.TICK_US * 1e-6
         """Length of one control period, s."""
-        self.plant = make_plant(self.data, seed, spread, contact)
+        self.plant = make_plant(self.data, seed, spread, contact, **options)
         self.to_device = bytearray()
         """Bytes of the link that the firmware has not read yet."""
         self.from_device = bytearray()
@@ -94,7 +100,7 @@ class SimulatedBoard(Simulated):
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
     reservoir starts full, as on a board that has been powered for a while. `contact`: whether bubbles push each
     other, as real ones do; without it each is alone, which shows what the control law itself does. `firmware`: what
-    runs the firmware; None is this interpreter, with `flash` for its store.
+    runs the firmware; None is this interpreter, with `flash` for its store. `options`: `PlantOptions`, such as `rubber="real"`.
     """
 
     def __init__(
@@ -106,8 +112,9 @@ class SimulatedBoard(Simulated):
         contact: bool = True,
         firmware: Firmware | None = None,
         flash: NorFlash | None = None,
+        **options: Unpack[PlantOptions],
     ):
-        super().__init__(board, seed=seed, spread=spread, contact=contact)
+        super().__init__(board, seed=seed, spread=spread, contact=contact, **options)
         n = self.data.BUBBLES
         self.firmware = firmware or InProcessFirmware(self.data, seed + 1, flash)
         self._pulses = np.zeros((n, 2))
@@ -173,11 +180,3 @@ class SimulatedBoard(Simulated):
     def close(self) -> None:
         """End the firmware."""
         self.firmware.close()
-
-
-def make_plant(data: ModuleType, seed: int, spread: float, contact: bool) -> Plant:
-    """The bubbles of a board, where its layout says; the rest as of `SimulatedBoard`."""
-    n = data.BUBBLES
-    parameters = PlantParameters.spread(n, spread, seed) if spread else PlantParameters.nominal(n)
-    layout = Layout.from_um(data.LAYOUT, data.PITCH_UM)
-    return Plant(parameters, seed=seed, contact=CompliantContact(layout) if contact else None)

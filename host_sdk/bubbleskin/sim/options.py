@@ -1,11 +1,14 @@
 """What may follow the `?` of a simulated board's URL: read and checked before anything is started."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import cast
 
 from bubbleskin.errors import InvalidInput
+from bubbleskin.sim.recipe import NUMBERS, PlantOptions
 
-_SHARES = ("spread", "loss")
+_REAL = ("spread", "loss", *NUMBERS)
+_TEXTS = ("rubber", "sheet", "plant")
 
 
 @dataclass(frozen=True)
@@ -21,15 +24,18 @@ class Options:
     contact: bool = True
     store: Path | None = None
     """The file that keeps its flash."""
+    plant: PlantOptions = field(default_factory=PlantOptions)
+    """What else the plant is asked to be."""
 
     @classmethod
     def parse(cls, options: dict[str, str], url: str) -> "Options":
         """From the query of `url`; `InvalidInput` for an option that is not known or not a number."""
-        known = [field.name for field in fields(cls)]
+        known = [field.name for field in fields(cls) if field.name != "plant"] + [*_TEXTS, *NUMBERS]
         for name in options:
             if name not in known:
                 raise InvalidInput(f"{url} has the option {name!r}; known are {', '.join(known)}.")
-        values = {name: _number(name, text, url) for name, text in options.items() if name != "store"}
+        values = {name: _number(name, text, url) for name, text in options.items() if name not in ("store", *_TEXTS)}
+        plant = {name: options[name] for name in _TEXTS if name in options}
         return cls(
             seed=int(values.get("seed", 0)),
             spread=values.get("spread", 0.0),
@@ -37,14 +43,15 @@ class Options:
             loss=values.get("loss", 0.0),
             contact=bool(values.get("contact", True)),
             store=_file(options["store"], url) if "store" in options else None,
+            plant=cast(PlantOptions, plant | {name: values[name] for name in NUMBERS if name in values}),
         )
 
 
 def _number(name: str, text: str, url: str) -> float:
     try:
-        return float(text) if name in _SHARES else int(text)
+        return float(text) if name in _REAL else int(text)
     except ValueError:
-        kind = "a number" if name in _SHARES else "a whole number"
+        kind = "a number" if name in _REAL else "a whole number"
         raise InvalidInput(f"{url} has {name}={text!r}, which is not {kind}.") from None
 
 

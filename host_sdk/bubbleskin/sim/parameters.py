@@ -1,19 +1,29 @@
 """The figures of a simulated wristband: membranes, lines, valves and sensors, one entry per bubble."""
 
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.sim.pneumatics import CRITICAL_RATIO, LITRE_PER_MINUTE, RESTRICTOR, tube_resistance
+from bubbleskin.sim.pneumatics import (
+    CRITICAL_RATIO,
+    LITRE_PER_MINUTE,
+    REFERENCE_TEMPERATURE,
+    RESTRICTOR,
+    tube_resistance,
+)
+from bubbleskin.sim.tolerances import draw
 
 _Array = NDArray[np.float64]
+
+RUBBERS = ("ideal", "real")
+"""`ideal` follows the tables' curve and forgets nothing, its gas has one temperature; `real` is `bubbleskin.sim.real`."""
 
 
 @dataclass(frozen=True)
 class Supply:
-    """What all bubbles share: reservoir, pump, dump valve, supply sensor and the gas itself. SI units."""
+    """What all bubbles share: reservoir, pump, dump valve, supply sensor, the gas itself and the air outside. SI units."""
 
     volume: float = 50e-6
     pump_free_flow: float = 3.0 * LITRE_PER_MINUTE
@@ -27,16 +37,24 @@ class Supply:
     relief_range: float = 2e3
     """Pressure by which it is open as wide as the dump valve, Pa."""
     polytropic: float = 1.0
-    """Exponent n of all gas: 1.0 is isothermal, right for small vessels and slow flow; 1.4 is adiabatic."""
+    """Exponent n of all gas where the rubber is ideal: 1.0 is isothermal, right for small vessels; 1.4 is adiabatic."""
     critical_ratio: float = CRITICAL_RATIO
+    """Of the dump valve."""
     sensor_offset: float = 0.0
     sensor_noise: float = 50.0
     """RMS, Pa."""
+    sensor_gain: float = 1.0
+    atmosphere: float = 101_325.0
+    """Pressure of the air outside, Pa."""
+    temperature: float = REFERENCE_TEMPERATURE
+    """Of that air and of all walls, K."""
+    heat_time: float = 1.0
+    """Time constant with which the reservoir's gas takes its wall's temperature, s. Rubber that is real only."""
 
 
 @dataclass(frozen=True)
 class PlantParameters:
-    """One array entry per bubble, SI units; `supply` is shared."""
+    """One array entry per bubble, SI units; `supply` is shared. What only `rubber="real"` has stands last."""
 
     mu: _Array
     c2: _Array
@@ -48,6 +66,8 @@ class PlantParameters:
     fill_conductance: _Array
     vent_conductance: _Array
     """Sonic conductances of the restrictors, m³/(s·Pa)."""
+    critical_ratio: _Array
+    """Of both."""
     fill_opening: _Array
     fill_closing: _Array
     vent_opening: _Array
@@ -59,57 +79,91 @@ class PlantParameters:
     """Lumped on the bubble's side of the tube, m³."""
     tube_resistance: _Array
     """Laminar, Pa·s/m³."""
+    leak: _Array
+    """RTṁ per Pa gauge, m³/s, as of `Plant.inject`, and beside what is injected."""
     sensor_gain: _Array
     sensor_offset: _Array
     sensor_noise: _Array
     """Offset and RMS noise in Pa."""
+    kz_up: _Array
+    kz_down: _Array
+    kxy: _Array
+    """Springs of neck and base, N/m: what holds a centre against being lifted, pushed down and pushed aside."""
+    kc: _Array
+    """Stiffness of a bubble's side, N/m; two that touch have the mean of both. Ideal rubber takes the mean of each spring."""
+
+    quick_strength: _Array
+    quick_time: _Array
+    slow_strength: _Array
+    slow_time: _Array
+    """The two Prony branches: stress that each adds to a sudden stretch, as a share of the lasting one, and for how many s."""
+    mullins: _Array
+    """Softening of rubber that has been stretched, by at most this share."""
+    mullins_width: _Array
+    """Share of the largest energy by which the present one must be below it for most of that."""
+    neck: _Array
+    """How far above the base plane a bubble's lowest point is that nobody lifts, m."""
+    heat_time: _Array
+    """Time constant with which a bubble's gas takes the wall's temperature, s, at the rest radius; it grows with its square."""
+    node_heat_time: _Array
+    """That of the node."""
+
     supply: Supply
+    rubber: str = "ideal"
+    """One of `RUBBERS`."""
+
+    @classmethod
+    def each(cls) -> list[str]:
+        """Names of the figures that each bubble has for itself."""
+        return [f.name for f in fields(cls) if f.name not in ("supply", "rubber")]
 
     @classmethod
     def nominal(cls, n: int) -> Self:
-        """`n` bubbles as the board's tables describe them."""
+        """`n` bubbles as the board's tables describe them; with `rubber="real"`, typical memory and heat besides.
 
-        def each(value: float) -> _Array:
-            return np.full(n, value)
-
-        return cls(
-            mu=each(39.62e3),
-            c2=each(417.3),
-            c3=each(60.65),
-            thickness=each(1e-3),
-            radius=each(2.5e-3),
-            viscosity=each(300.0),
-            fill_conductance=each(RESTRICTOR),
-            vent_conductance=each(RESTRICTOR),
-            fill_opening=each(1.2e-3),
-            fill_closing=each(1.0e-3),
-            vent_opening=each(1.2e-3),
-            vent_closing=each(1.0e-3),
-            node_volume=each(0.05e-6),
-            tube_volume=each(0.15e-6),
-            tube_resistance=each(tube_resistance(length=0.3, bore=0.8e-3)),
-            sensor_gain=each(1.0),
-            sensor_offset=each(0.0),
-            sensor_noise=each(50.0),
-            supply=Supply(),
-        )
+        Heat: a sphere's slowest mode of conduction, r0²/(π² a) with a = 21 mm²/s of air; a passage of 1 mm bore, d²/(23 a).
+        """
+        figures: dict[str, Any] = {name: np.full(n, value) for name, value in _NOMINAL.items()}
+        return cls(**figures, supply=Supply())
 
     @classmethod
     def spread(cls, n: int, spread: float, seed: int) -> Self:
-        """`n` bubbles that differ as real ones do, each figure drawn uniformly from its tolerance.
-
-        `spread` 0.1 means wall, μ and conductances ±10 %, dead times ±0.3 ms and sensor offsets ±300 Pa; all
-        scale with it. The same seed gives the same bubbles; a spread of 0 gives `nominal(n)` exactly.
-        """
-        rng = np.random.default_rng(seed)
-        p = cls.nominal(n)
-        drawn = {name: getattr(p, name) * (1.0 + spread * rng.uniform(-1, 1, n)) for name in _RELATIVE}
-        for name in _DEAD_TIMES:
-            drawn[name] = np.maximum(getattr(p, name) + spread * rng.uniform(-3e-3, 3e-3, n), 0.0)
-        drawn["sensor_offset"] = p.sensor_offset + spread * rng.uniform(-3e3, 3e3, n)
-        supply = replace(p.supply, sensor_offset=p.supply.sensor_offset + spread * rng.uniform(-3e3, 3e3))
-        return replace(p, **drawn, supply=supply)
+        """`n` bubbles of ideal rubber that differ in walls, μ, valves and sensor offsets: `bubbleskin.sim.tolerances`."""
+        return draw(cls.nominal(n), spread, seed)
 
 
-_RELATIVE = ("thickness", "mu", "fill_conductance", "vent_conductance")
-_DEAD_TIMES = ("fill_opening", "fill_closing", "vent_opening", "vent_closing")
+_NOMINAL = {
+    "mu": 39.62e3,
+    "c2": 417.3,
+    "c3": 60.65,
+    "thickness": 1e-3,
+    "radius": 2.5e-3,
+    "viscosity": 300.0,
+    "fill_conductance": RESTRICTOR,
+    "vent_conductance": RESTRICTOR,
+    "critical_ratio": CRITICAL_RATIO,
+    "fill_opening": 1.2e-3,
+    "fill_closing": 1.0e-3,
+    "vent_opening": 1.2e-3,
+    "vent_closing": 1.0e-3,
+    "node_volume": 0.05e-6,
+    "tube_volume": 0.15e-6,
+    "tube_resistance": tube_resistance(length=0.3, bore=0.8e-3),
+    "leak": 0.0,
+    "sensor_gain": 1.0,
+    "sensor_offset": 0.0,
+    "sensor_noise": 50.0,
+    "kz_up": 10.0,
+    "kz_down": 3000.0,
+    "kxy": 50.0,
+    "kc": 300.0,
+    "quick_strength": 0.05,
+    "quick_time": 0.1,
+    "slow_strength": 0.05,
+    "slow_time": 3.0,
+    "mullins": 0.10,
+    "mullins_width": 0.5,
+    "neck": 0.0,
+    "heat_time": 30e-3,
+    "node_heat_time": 2e-3,
+}

@@ -13,9 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from bubbleskin.contact.energy import BUBBLE, SPRINGS
 from bubbleskin.errors import InvalidInput
-from bubbleskin.membrane.balloon import ATMOSPHERE, yeoh_pressure
-from bubbleskin.sim import kernel
-from bubbleskin.sim.parameters import PlantParameters, Supply
+from bubbleskin.membrane.balloon import yeoh_pressure
+from bubbleskin.sim import kernel, records
+from bubbleskin.sim.parameters import RUBBERS, PlantParameters, Supply
+from bubbleskin.sim.pneumatics import REFERENCE_TEMPERATURE, VISCOSITY_EXPONENT
+from bubbleskin.sim.real import kernel as real_kernel
+from bubbleskin.sim.real import rest as real_rest
 
 if TYPE_CHECKING:
     from bubbleskin.contact.model import CompliantContact
@@ -52,7 +55,8 @@ class Plant:
     """`len(parameters.mu)` bubbles at rest, at atmospheric pressure, on a reservoir at `supply_pa` gauge.
 
     By default the reservoir is that of a board which has been powered for a while. `seed` is that of the
-    sensors' noise. `contact` says where the bubbles are and how they push each other; without one, each is alone.
+    sensors' noise. `contact` says where the bubbles are and how they push each other; without one, each is alone. Real rubber
+    takes of it where the bubbles are, and pushes with the springs of `parameters`.
     Attributes: `parameters`, and `time` in s since the start.
     """
 
@@ -64,52 +68,72 @@ class Plant:
         substep: float = SUBSTEP,
         contact: "CompliantContact | None" = None,
     ):
+        if parameters.rubber not in RUBBERS:
+            raise InvalidInput(f"rubber is {parameters.rubber!r}; choose one of {', '.join(RUBBERS)}.")
         n = len(parameters.mu)
         self.parameters = parameters
         self.time = 0.0
         self._substep = substep
-        self._constants = np.empty(n, kernel.CONSTANTS)
-        for name in kernel.CONSTANTS.names or ():
+        self._real = parameters.rubber == "real"
+        self._atmosphere = parameters.supply.atmosphere
+        self._neck = parameters.neck if self._real else np.zeros(n)
+        self._constants = np.empty(n, records.CONSTANTS)
+        for name in records.CONSTANTS.names or ():
             self._constants[name] = getattr(parameters, name)
-        self._state = np.zeros(n, kernel.STATE)
+        self._state = np.zeros(n, records.STATE)
         self._state["stretch"] = 1.0
-        self._state["pressure"] = self._state["node"] = ATMOSPHERE
-        self._supply = np.array([astuple(parameters.supply)], kernel.SUPPLY)
-        self._air = np.zeros(1, kernel.AIR)
-        self._air["pressure"] = ATMOSPHERE + supply_pa
+        self._state["pressure"] = self._state["node"] = self._atmosphere
+        self._supply = np.array([astuple(parameters.supply)], records.SUPPLY)
+        self._air = np.zeros(1, records.AIR)
+        self._air["pressure"] = self._atmosphere + supply_pa
+        if self._real:
+            real_rest.fill(self._state, self._air, parameters)
+        else:
+            self._warm()
         self._fill_on, self._vent_on = np.zeros(n), np.zeros(n)
         self._noise = np.zeros(n + 1)
         self._rng = np.random.default_rng(seed)
         self._place = np.zeros((n if contact else 0, 4))
-        """Centre x, y, z and radius of each bubble, m: the state of `contact.energy`. No rows without contact."""
+        """Centre x, y, z and radius of each bubble, m. No rows without contact."""
         self._force = np.zeros_like(self._place)
-        self._necks, self._springs = np.zeros(len(self._place), BUBBLE), np.zeros(1, SPRINGS)
+        self._barbs = np.zeros((len(self._place), 2))
         self._pairs = np.zeros((0, 2), np.int64)
+        necks, springs = np.zeros(len(self._place), BUBBLE), np.zeros(1, SPRINGS)
         if contact:
             if len(contact) != n:
                 raise InvalidInput(f"The contact is of {len(contact)} bubbles, the plant has {n}.")
-            self._necks, self._springs[0] = contact.bubbles, contact.springs
+            necks, springs[0] = contact.bubbles, contact.springs
             for axis in ("x", "y"):
-                self._necks[axis] += np.random.default_rng((seed, ord(axis))).normal(0.0, BARBS, n)
-            barbs = np.column_stack([self._necks["x"], self._necks["y"]])
-            gap = np.linalg.norm(barbs[:, None] - barbs[None], axis=2)
+                necks[axis] += np.random.default_rng((seed, ord(axis))).normal(0.0, BARBS, n)
+            self._barbs = np.column_stack([necks["x"], necks["y"]])
+            gap = np.linalg.norm(self._barbs[:, None] - self._barbs[None], axis=2)
             self._pairs = np.ascontiguousarray(np.argwhere(np.triu(gap < REACH, 1)))
             self._stand()
 
         # Where the arrays are, as the kernel takes them: their content changes, they themselves do not.
         self._plant = (n, *map(_address, (self._state, self._constants, self._air, self._supply)))
-        contact_arrays = (self._place, self._necks, self._springs, self._pairs, self._force)
-        self._moving = (len(self._place), len(self._pairs), *map(_address, contact_arrays))
+        own = (self._barbs,) if self._real else (necks, springs)
+        self._kept = (self._place, *own, self._pairs, self._force)
+        self._moving = (len(self._place), len(self._pairs), *map(_address, self._kept))
         self._coils = (_address(self._fill_on), _address(self._vent_on))
         self._read = (_address(self._noise), *PA_PER_COUNT)
         self._into: tuple[NDArray[np.uint16] | None, int] = (None, 0)  # what `read` filled last, and where that is
-        self._advance, self._sense = kernel.compiled()["advance"], kernel.compiled()["sense"]
+        functions = real_kernel.compiled() if self._real else kernel.compiled()
+        self._advance, self._sense = functions["advance"], functions["sense"]
+
+    def _warm(self) -> None:
+        """Let the pV that orifices and tubes pass be that of gas at its temperature: orifices as √T, tubes as its viscosity."""
+        warm = self.parameters.supply.temperature / REFERENCE_TEMPERATURE
+        for name in ("fill_conductance", "vent_conductance"):
+            self._constants[name] *= math.sqrt(warm)
+        self._supply["dump_conductance"] *= math.sqrt(warm)
+        self._constants["tube_resistance"] *= warm**VISCOSITY_EXPONENT
 
     def _stand(self) -> None:
         """Put every bubble on its barb, touching the base."""
         if len(self._place):
             radius = self.parameters.radius * self._state["stretch"]
-            self._place[:] = np.column_stack([self._necks["x"], self._necks["y"], radius, radius])
+            self._place[:] = np.column_stack([self._barbs, radius + self._neck, radius])
 
     def advance(self, dt: float, fill_on: ArrayLike, vent_on: ArrayLike, pump: float = 0.0, dump: bool = False) -> None:
         """Let `dt` seconds pass.
@@ -159,23 +183,36 @@ class Plant:
         Of the reservoir, whatever the `bubble`: `supply_stuck`, `supply_bias`, `supply_absent` the same of its sensor;
         `supply_flat`: Pa that this says, with noise, whatever the pressure; `relief_stuck`: 1 for a relief valve that stays shut.
         """
-        if fault in kernel.SUPPLY_FAILURES:
+        if fault in records.SUPPLY_FAILURES:
             self._air[fault] = value
-        elif fault in kernel.FAILURES:
+        elif fault in records.FAILURES:
             self._state[fault][bubble] = value
         else:
-            known = ", ".join(kernel.FAILURES + kernel.SUPPLY_FAILURES)
+            known = ", ".join(records.FAILURES + records.SUPPLY_FAILURES)
             raise InvalidInput(f"no failure is called {fault!r}; choose one of {known}")
 
     def rest_at(self, height_mm: ArrayLike) -> None:
-        """Put every bubble at rest at `height_mm`, one for all or (n,): valves shut, line at its pressure."""
+        """Put every bubble at rest at `height_mm`, one for all or (n,): valves shut, line at its pressure.
+
+        Real rubber is as after a long time there: relaxed, softened by that height at least.
+        """
         s, p = self._state, self.parameters
-        s["stretch"] = np.asarray(height_mm) / (2e3 * p.radius)
-        s["pressure"] = ATMOSPHERE + yeoh_pressure(s["stretch"], p.mu, p.c2, p.c3, p.thickness, p.radius)
-        s["node"] = s["pressure"]
+        s["stretch"] = (np.asarray(height_mm) - 1e3 * self._neck) / (2e3 * p.radius)
+        if self._real:
+            real_rest.stand(s, p)
+        else:
+            held = yeoh_pressure(s["stretch"], p.mu, p.c2, p.c3, p.thickness, p.radius)
+            s["pressure"] = s["node"] = self._atmosphere + held
         for name in ("fill_energised", "fill_open", "vent_energised", "vent_open"):
             s[name] = False
         self._stand()
+
+    def soften(self, height_mm: ArrayLike) -> None:
+        """Let every wall have been stretched to `height_mm` once, one for all or (n,); ideal rubber does not mind."""
+        stretch = np.broadcast_to(
+            (np.asarray(height_mm) - 1e3 * self._neck) / (2e3 * self.parameters.radius), len(self._state)
+        )
+        real_rest.soften(self._state, self.parameters, stretch)
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy everything that changes, failures and noise generator included, for `restore`."""
@@ -192,15 +229,15 @@ class Plant:
 
     @property
     def height_mm(self) -> NDArray[np.float64]:
-        """Top of each bubble above the base plane in mm, (n,): z + R, which is 2R for one that nobody lifts."""
+        """Top of each bubble above the base plane in mm, (n,): z + R, which is `alone_mm` for one that nobody lifts."""
         if len(self._place):
             return np.asarray(1e3 * (self._place[:, 2] + self._place[:, 3]))
         return self.alone_mm
 
     @property
     def alone_mm(self) -> NDArray[np.float64]:
-        """2R of each bubble in mm, (n,): its height where nobody lifts it."""
-        return 2e3 * self.parameters.radius * self._state["stretch"]
+        """2R of each bubble in mm, (n,), and how high its neck holds it: its height where nobody lifts it."""
+        return 2e3 * self.parameters.radius * self._state["stretch"] + 1e3 * self._neck
 
     @property
     def position_m(self) -> NDArray[np.float64]:
@@ -210,31 +247,39 @@ class Plant:
     @property
     def pressure_pa(self) -> NDArray[np.float64]:
         """True gauge pressure in each bubble, Pa, (n,)."""
-        return self._state["pressure"] - ATMOSPHERE
+        return self._state["pressure"] - self._atmosphere
 
     @property
     def node_pa(self) -> NDArray[np.float64]:
         """True gauge pressure at each sensor, between valves and tube, Pa, (n,)."""
-        return self._state["node"] - ATMOSPHERE
+        return self._state["node"] - self._atmosphere
 
     @property
     def supply_pa(self) -> float:
         """True gauge pressure of the reservoir, Pa."""
-        return float(self._air["pressure"][0]) - ATMOSPHERE
+        return float(self._air["pressure"][0]) - self._atmosphere
 
     @property
     def air(self) -> NDArray[np.float64]:
-        """pV behind each bubble's valves, node, tube and sphere together, in J, (n,)."""
+        """Air behind each bubble's valves, node, tube and sphere together, in J, (n,): pV, of real gas at 20 °C."""
         p, s = self.parameters, self._state
+        if self._real:
+            return np.asarray(s["node_air"] + s["line_air"])
         volume = p.tube_volume + 4 / 3 * np.pi * (p.radius * s["stretch"]) ** 3
         return s["node"] * p.node_volume + s["pressure"] * volume
 
     @property
+    def reservoir_air(self) -> float:
+        """The same of the reservoir."""
+        air = self._air[0]
+        return float(air["air"] if self._real else air["pressure"] * self.parameters.supply.volume)
+
+    @property
     def pumped(self) -> float:
-        """Air that the pump has brought since the start, pV in J."""
+        """Air that the pump has brought since the start, in J as `air`."""
         return float(self._air["pumped"][0])
 
     @property
     def vented(self) -> float:
-        """Air lost since the start through vents, dump valve and failures, pV in J."""
+        """Air lost since the start through vents, dump valve and failures, in J as `air`."""
         return float(self._air["vented"][0])

@@ -7,10 +7,11 @@ scalars are compiled by `kernel.py`; here they stay Python.
 
 import math
 
-from bubbleskin.membrane.balloon import ATMOSPHERE
-
 REFERENCE_PRESSURE = 100e3
 """Absolute pressure at which ISO 6358 states a conductance (ANR), Pa."""
+
+REFERENCE_TEMPERATURE = 293.15
+"""Temperature at which it does, K. Air is counted at this one."""
 
 DM3_PER_S_BAR = 1e-8
 """One dm³/(s·bar), the unit of data sheets, in m³/(s·Pa)."""
@@ -20,6 +21,9 @@ LITRE_PER_MINUTE = 1e-3 / 60
 
 AIR_VISCOSITY = 1.81e-5
 """Dynamic viscosity of air at 20 °C, Pa·s."""
+
+VISCOSITY_EXPONENT = 0.7
+"""It grows with this power of the temperature, and with it a tube's resistance."""
 
 CRITICAL_RATIO = 0.5
 """p2/p1 below which a restrictor is choked: 0.5 suits short tube orifices (doi 10.1177/1687814016687264)."""
@@ -69,13 +73,13 @@ def tube_flow(p1: float, p2: float, resistance: float) -> float:
     return 0.5 * (p1 + p2) * (p1 - p2) / resistance
 
 
-def pump_flow(gauge: float, duty: float, free_flow: float, stall: float) -> float:
-    """Air flow RTṁ in W that the pump brings against `gauge` Pa.
+def pump_flow(gauge: float, duty: float, free_flow: float, stall: float, atmosphere: float) -> float:
+    """Air flow RTṁ in W that the pump brings against `gauge` Pa, out of an `atmosphere` of so many Pa.
 
     Free air: `free_flow` m³/s against nothing, falling linearly to none at `stall` Pa gauge. Its check valve
     lets nothing back.
     """
-    return ATMOSPHERE * free_flow * duty * max(0.0, 1.0 - gauge / stall)
+    return atmosphere * free_flow * duty * max(0.0, 1.0 - gauge / stall)
 
 
 def valve_window(

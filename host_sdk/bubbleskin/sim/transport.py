@@ -75,7 +75,7 @@ def _start(scheme: str, name: str, chosen: Options) -> Simulated:
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip
 
-        return open_chip(name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact)
+        return open_chip(name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, **chosen.plant)
     firmware = None
     if scheme == "micropython":
         from bubbleskin.sim.micropython import MicroPythonFirmware
@@ -84,7 +84,13 @@ def _start(scheme: str, name: str, chosen: Options) -> Simulated:
     try:
         flash = NorFlash(path=chosen.store) if chosen.store else None
         return SimulatedBoard(
-            name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, firmware=firmware, flash=flash
+            name,
+            seed=chosen.seed,
+            spread=chosen.spread,
+            contact=chosen.contact,
+            firmware=firmware,
+            flash=flash,
+            **chosen.plant,
         )
     except BaseException:
         if firmware:

@@ -2,9 +2,10 @@
 
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from bubbleskin.errors import BubbleskinError
+from bubbleskin.sim.recipe import PlantOptions
 from bubbleskin.toolchain.rp2040 import built
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ def open_chip(
     spread: float = 0.0,
     contact: bool = True,
     absent: tuple[str, ...] = (),
+    **options: Unpack[PlantOptions],
 ) -> "Rp2040Board":
     """The board `name` on an emulated RP2040, booted as far as USB.
 
@@ -34,6 +36,6 @@ def open_chip(
         )
     from bubbleskin.sim.rp2040.board import Rp2040Board
 
-    board = Rp2040Board(name, firmware, seed=seed, spread=spread, contact=contact, absent=absent)
+    board = Rp2040Board(name, firmware, seed=seed, spread=spread, contact=contact, absent=absent, **options)
     board.boot()
     return board

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bubbleskin.errors import LinkError
 from bubbleskin.sim.board import Simulated
+from bubbleskin.sim.recipe import PlantOptions
 from bubbleskin.sim.rp2040.banks import Bank, Pca9685Bank, PwmBank
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import BOOT_S, Chip
@@ -35,7 +36,7 @@ def pass_over_carrier(chip: Chip, data: ModuleType) -> None:
 class Rp2040Board(Simulated):
     """The board called `board`, or of that file, running the UF2 at `firmware`, in emulated time.
 
-    `seed`, `spread` and `contact` are those of `SimulatedBoard`. `absent`: chips that are not soldered in, such as
+    `seed`, `spread`, `contact` and `options` are those of `SimulatedBoard`. `absent`: chips that are not soldered in, such as
     "converter0" or "driver2".
     """
 
@@ -48,8 +49,9 @@ class Rp2040Board(Simulated):
         spread: float = 0.0,
         contact: bool = True,
         absent: tuple[str, ...] = (),
+        **options: Unpack[PlantOptions],
     ):
-        super().__init__(board, seed=seed, spread=spread, contact=contact)
+        super().__init__(board, seed=seed, spread=spread, contact=contact, **options)
         self.chip = Chip(firmware)
         self.from_device = self.chip.from_device
         self._supply_lost = False

@@ -1,0 +1,114 @@
+"""From what somebody asks of a simulated board to the plant behind it."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import TypedDict, Unpack
+
+from bubbleskin.contact.model import CompliantContact
+from bubbleskin.errors import InvalidInput
+from bubbleskin.layout import Layout
+from bubbleskin.sim.parameters import RUBBERS, PlantParameters
+from bubbleskin.sim.plant import Plant
+from bubbleskin.sim.tolerances import draw
+
+SHEETS = {
+    "paper": (39.62e3, 417.3, 60.65),
+    "stiff25": (1.25 * 39.62e3, 417.3, 60.65),
+    "stiff50": (1.50 * 39.62e3, 417.3, 60.65),
+    "ecoflex-00-30": (15.78e3, 91.8, 0.0),
+}
+"""μ, C2 and C3 in Pa: the display paper's fit, 25 and 50 % stiffer ones that snap through, and Ecoflex 00-30 in tension
+(L. Marechal et al., Soft Robotics Materials Database, 2021, fitted with C3 ≥ 0)."""
+
+WHOLE_LEAK = 5e-6
+"""RTṁ per Pa gauge, m³/s, at which a bubble of the paper's rubber at 12 mm begins to lose all of its air in a second."""
+
+
+class PlantOptions(TypedDict, total=False):
+    """What the plant of a simulated board can be asked to be, besides `seed`, `spread` and `contact`."""
+
+    rubber: str
+    """"ideal" (the default): the tables' own curve, no memory. "real": `docs/simulator.md`."""
+    sheet: str
+    """One of `SHEETS`; "paper" is what the board's tables are made of."""
+    springs: float
+    """How much the springs of necks, base and contact differ from the nominal: 0.3 for ± 30 %. Without it `spread` says so
+    where the rubber is real."""
+    atmosphere_kpa: float
+    """Pressure of the air outside; 101.325."""
+    gas_c: float
+    """Temperature of gas and walls; 20."""
+    viscosity: float
+    """By how much more viscous than the nominal the rubber is; 1."""
+    leak: float
+    """Share of its air that a bubble at 12 mm loses in a second; 0."""
+    parameters: PlantParameters
+    """All figures, one entry per bubble, instead of those above and of `spread`."""
+    plant: str | Path
+    """The same in a file, as of `bubbleskin.sim.plant_file`."""
+
+
+NUMBERS = {
+    "springs": (0.0, 1.0, "a share such as 0.3 for ± 30 %"),
+    "atmosphere_kpa": (50.0, 120.0, "kPa"),
+    "gas_c": (-20.0, 60.0, "°C"),
+    "viscosity": (0.05, 20.0, "1 for the nominal, 3 for three times that"),
+    "leak": (0.0, 0.5, "a share of a full bubble's air per second, such as 0.01"),
+}
+"""Limits of each number, and its unit."""
+
+_WHOLE = ("parameters", "plant")
+
+
+def make_plant(data: ModuleType, seed: int, spread: float, contact: bool, **options: Unpack[PlantOptions]) -> Plant:
+    """The bubbles of a board, where its layout says; the rest as of `SimulatedBoard`."""
+    n = data.BUBBLES
+    parameters = make_parameters(n, seed, spread, **options)
+    if len(parameters.mu) != n:
+        raise InvalidInput(f"The plant's parameters are of {len(parameters.mu)} bubbles, {data.NAME} has {n}.")
+    model = None
+    if contact:
+        p, layout = parameters, Layout.from_um(data.LAYOUT, data.PITCH_UM)
+        kz, kbase, kxy, kc = (float(spring.mean()) for spring in (p.kz_up, p.kz_down, p.kxy, p.kc))
+        model = CompliantContact(layout, kz=kz, kbase=kbase, kxy=kxy, kc=kc)
+    return Plant(parameters, seed=seed, contact=model)
+
+
+def make_parameters(n: int, seed: int, spread: float, **options: Unpack[PlantOptions]) -> PlantParameters:
+    """The figures of `n` bubbles; `InvalidInput` for what cannot be asked."""
+    _check(spread, options)
+    whole = options.get("parameters")
+    if whole is not None:
+        return whole
+    nominal = PlantParameters.nominal(n)
+    mu, c2, c3 = SHEETS[options.get("sheet", "paper")]
+    asked = {"mu": mu, "c2": c2, "c3": c3, "leak": WHOLE_LEAK * options.get("leak", 0.0)}
+    supply = replace(
+        nominal.supply,
+        atmosphere=1e3 * options.get("atmosphere_kpa", 1e-3 * nominal.supply.atmosphere),
+        temperature=273.15 + options.get("gas_c", 20.0),
+    )
+    figures = replace(
+        nominal,
+        **{name: 0.0 * nominal.mu + value for name, value in asked.items()},
+        viscosity=options.get("viscosity", 1.0) * nominal.viscosity,
+        rubber=options.get("rubber", "ideal"),
+        supply=supply,
+    )
+    return draw(figures, spread, seed, springs=options.get("springs"))
+
+
+def _check(spread: float, options: PlantOptions) -> None:
+    for name, choice in (("rubber", RUBBERS), ("sheet", tuple(SHEETS))):
+        if options.get(name, choice[0]) not in choice:
+            raise InvalidInput(f"{name} is {options.get(name)!r}; choose one of {', '.join(choice)}.")
+    for name, (least, most, unit) in NUMBERS.items():
+        value = options.get(name, least)
+        if not (isinstance(value, int | float) and math.isfinite(value) and least <= value <= most):
+            raise InvalidInput(f"{name} is {value}; give a number from {least:g} to {most:g}, {unit}.")
+    whole = [name for name in _WHOLE if options.get(name) is not None]
+    others = [name for name in options if name not in _WHOLE] + ["spread"] * bool(spread)
+    if whole and (others or len(whole) > 1):
+        raise InvalidInput(f"{whole[0]} says all of the plant; leave out {', '.join(whole[1:] + others)}.")
