@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from array import array
+from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from bubble_firmware.hal.lockstep import LINK_IN
 from bubbleskin import boards
 from bubbleskin.errors import InvalidInput
+from bubbleskin.sim import plant_file
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.recipe import PlantOptions, make_plant
@@ -47,6 +49,7 @@ class Simulated(ABC):
         """Bytes of the link that the firmware has not read yet."""
         self.from_device = bytearray()
         """Bytes of the link that the firmware has sent and nobody has taken yet."""
+        self._seed = seed
         self._asked_s = 0.0  # of `step`, less than a tick
 
     @property
@@ -63,6 +66,15 @@ class Simulated(ABC):
     def alone_mm(self) -> NDArray[np.float64]:
         """How high each bubble would truly stand if no neighbour lifted it, mm, (n,): what the firmware can know."""
         return self.plant.alone_mm
+
+    def write_plant(self, path: str | Path) -> None:
+        """Write every figure of the plant to the file `path`, what its walls have been through included.
+
+        `sim://BOARD?plant=PATH` has the same plant, with the same `seed` the same noise too. Raises `InvalidInput`.
+        """
+        plant = self.plant
+        figures = replace(plant.parameters, conditioned=np.maximum(plant.largest_stretch, 1.0))
+        plant_file.write(path, figures, f"The plant of {self.name} with seed={self._seed}, after {plant.time:.3f} s")
 
     @property
     @abstractmethod

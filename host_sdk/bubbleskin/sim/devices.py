@@ -1,7 +1,15 @@
 """Valves, relief valve and sensors of the plant, compiled: what is the same whatever the bubbles are made of."""
 
-from bubbleskin.native import njit
-from bubbleskin.sim import pneumatics
+import inspect
+import sys
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from bubbleskin.native import load, njit, resolve
+from bubbleskin.sim import parameters, pneumatics, records
+from bubbleskin.sim.records import AIR, CONSTANTS, STATE, SUPPLY
 
 _valve_window = njit(pneumatics.valve_window)
 _sensor_counts = njit(pneumatics.sensor_counts)
@@ -58,3 +66,36 @@ def read_sensors(bubbles, reservoir, noise, pa_per_count, supply_pa_per_count, c
         counts[-1] = air.supply_stuck
     if air.supply_absent > 0.0:
         counts[-1] = 0
+
+
+def pointer(kind: Any) -> Any:
+    """numba's type for where an array of numbers or of records is."""
+    import numba
+
+    return numba.types.CPointer(numba.from_dtype(kind) if isinstance(kind, np.dtype) else kind)
+
+
+def _entries() -> dict[str, Any]:
+    """`sense` for numba, with addresses in place of arrays."""
+    import numba
+    from numba import carray, float64, int64, uint16, void
+
+    resolve(globals())
+    state, constants, air, supply = map(pointer, (STATE, CONSTANTS, AIR, SUPPLY))
+    numbers, words = map(pointer, (float64, uint16))
+
+    @numba.njit(void(int64, state, constants, air, supply, numbers, float64, float64, words))
+    def sense(n, state, constants, air, supply, noise, pa_per_count, supply_pa_per_count, counts):  # type: ignore[no-untyped-def]
+        bubbles = carray(state, (n,)), carray(constants, (n,))
+        reservoir = carray(air, (1,)), carray(supply, (1,))
+        noises, found = carray(noise, (n + 1,)), carray(counts, (n + 1,))
+        read_sensors(bubbles, reservoir, noises, pa_per_count, supply_pa_per_count, found)
+
+    return {"sense": sense}
+
+
+@cache
+def sense() -> Any:
+    """Reads all sensors; `Plant` says what it is given."""
+    modules = [sys.modules[__name__], pneumatics, parameters, records]
+    return load("sensors", "".join(map(inspect.getsource, modules)).encode(), _entries)["sense"]

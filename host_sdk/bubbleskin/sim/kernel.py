@@ -13,15 +13,13 @@ import sys
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from bubbleskin.contact import energy
 from bubbleskin.contact.energy import BUBBLE, SPRINGS
 from bubbleskin.contact.energy import mechanics as _mechanics
 from bubbleskin.membrane import balloon
 from bubbleskin.native import load, njit, resolve
 from bubbleskin.sim import devices, parameters, pneumatics, records
-from bubbleskin.sim.devices import read_sensors as _read_sensors
+from bubbleskin.sim.devices import pointer
 from bubbleskin.sim.devices import set_windows as _set_windows
 from bubbleskin.sim.devices import way_out as _way_out
 from bubbleskin.sim.pneumatics import OPEN_LINE
@@ -129,15 +127,12 @@ def _advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump):  # t
 
 
 def _entries() -> dict[str, Any]:
-    """`advance` and `sense` for numba, with addresses in place of arrays; `Plant` says what they are given."""
+    """`advance` for numba, with addresses in place of arrays; `Plant` says what they are given."""
     import numba
-    from numba import carray, float64, int64, uint16, void
+    from numba import carray, float64, int64, void
 
-    def array_of(kind: Any) -> Any:
-        return numba.types.CPointer(numba.from_dtype(kind) if isinstance(kind, np.dtype) else kind)
-
-    state, constants, air, supply, necks, springs = map(array_of, (STATE, CONSTANTS, AIR, SUPPLY, BUBBLE, SPRINGS))
-    numbers, whole, words = map(array_of, (float64, int64, uint16))
+    state, constants, air, supply, necks, springs = map(pointer, (STATE, CONSTANTS, AIR, SUPPLY, BUBBLE, SPRINGS))
+    numbers, whole = map(pointer, (float64, int64))
     plant = (int64, state, constants, air, supply)
     resolve(globals())
 
@@ -186,19 +181,11 @@ def _entries() -> dict[str, Any]:
         coils = carray(fill_on, (n,)), carray(vent_on, (n,))
         _advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump != 0)
 
-    @numba.njit(void(*plant, numbers, float64, float64, words))
-    def sense(n, state, constants, air, supply, noise, pa_per_count, supply_pa_per_count, counts):  # type: ignore[no-untyped-def]
-        bubbles = carray(state, (n,)), carray(constants, (n,))
-        reservoir = carray(air, (1,)), carray(supply, (1,))
-        _read_sensors(
-            bubbles, reservoir, carray(noise, (n + 1,)), pa_per_count, supply_pa_per_count, carray(counts, (n + 1,))
-        )
-
-    return {"advance": advance, "sense": sense}
+    return {"advance": advance}
 
 
 @cache
-def compiled() -> dict[str, Any]:
-    """`advance` and `sense`, which are documented where `Plant` calls them."""
+def advance() -> Any:
+    """Steps a plant; `Plant` says what it is given."""
     modules = [sys.modules[__name__], balloon, pneumatics, energy, parameters, devices, records]
-    return load("plant", "".join(map(inspect.getsource, modules)).encode(), _entries)
+    return load("plant", "".join(map(inspect.getsource, modules)).encode(), _entries)["advance"]

@@ -1,5 +1,6 @@
 """The figures of a simulated wristband: membranes, lines, valves and sensors, one entry per bubble."""
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
@@ -101,6 +102,8 @@ class PlantParameters:
     """Softening of rubber that has been stretched, by at most this share."""
     mullins_width: _Array
     """Share of the largest energy by which the present one must be below it for most of that."""
+    conditioned: _Array
+    """The largest stretch that each wall has seen before the start; 1 for one that is as it was made."""
     neck: _Array
     """How far above the base plane a bubble's lowest point is that nobody lifts, m."""
     heat_time: _Array
@@ -130,6 +133,43 @@ class PlantParameters:
     def spread(cls, n: int, spread: float, seed: int) -> Self:
         """`n` bubbles of ideal rubber that differ in walls, μ, valves and sensor offsets: `bubbleskin.sim.tolerances`."""
         return draw(cls.nominal(n), spread, seed)
+
+
+ANY_SIGN = ("sensor_offset", "neck")
+MAY_BE_ZERO = (
+    *(
+        "c2",
+        "c3",
+        "leak",
+        "critical_ratio",
+        "fill_opening",
+        "fill_closing",
+        "vent_opening",
+        "vent_closing",
+        "sensor_noise",
+    ),
+    *(
+        "fill_conductance",
+        "vent_conductance",
+        "dump_conductance",
+        "pump_free_flow",
+        "mullins",
+        "quick_strength",
+        "slow_strength",
+    ),
+)
+"""Figures that may be negative, and those that may be nothing; all others are more than 0."""
+
+
+def allowed(name: str, value: float) -> str:
+    """What the figure `name` may be, as words for a sentence; empty where `value` is that."""
+    if name in ANY_SIGN:
+        return "" if math.isfinite(value) else "a finite number"
+    if name == "relief_pressure" and value == math.inf:
+        return ""
+    if name in MAY_BE_ZERO:
+        return "" if math.isfinite(value) and value >= 0 else "a finite number, 0 or more"
+    return "" if math.isfinite(value) and value > 0 else "a finite number, more than 0"
 
 
 _NOMINAL = {
@@ -163,6 +203,7 @@ _NOMINAL = {
     "slow_time": 3.0,
     "mullins": 0.10,
     "mullins_width": 0.5,
+    "conditioned": 1.0,
     "neck": 0.0,
     "heat_time": 30e-3,
     "node_heat_time": 2e-3,

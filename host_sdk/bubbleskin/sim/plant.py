@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from bubbleskin.contact.energy import BUBBLE, SPRINGS
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import yeoh_pressure
-from bubbleskin.sim import kernel, records
+from bubbleskin.sim import devices, kernel, records
 from bubbleskin.sim.parameters import RUBBERS, PlantParameters, Supply
 from bubbleskin.sim.pneumatics import REFERENCE_TEMPERATURE, VISCOSITY_EXPONENT
 from bubbleskin.sim.real import kernel as real_kernel
@@ -87,7 +87,7 @@ class Plant:
         self._air = np.zeros(1, records.AIR)
         self._air["pressure"] = self._atmosphere + supply_pa
         if self._real:
-            real_rest.fill(self._state, self._air, parameters)
+            real_rest.begin(self._state, self._air, parameters)
         else:
             self._warm()
         self._fill_on, self._vent_on = np.zeros(n), np.zeros(n)
@@ -118,8 +118,7 @@ class Plant:
         self._coils = (_address(self._fill_on), _address(self._vent_on))
         self._read = (_address(self._noise), *PA_PER_COUNT)
         self._into: tuple[NDArray[np.uint16] | None, int] = (None, 0)  # what `read` filled last, and where that is
-        functions = real_kernel.compiled() if self._real else kernel.compiled()
-        self._advance, self._sense = functions["advance"], functions["sense"]
+        self._advance, self._sense = (real_kernel if self._real else kernel).advance(), devices.sense()
 
     def _warm(self) -> None:
         """Let the pV that orifices and tubes pass be that of gas at its temperature: orifices as √T, tubes as its viscosity."""
@@ -209,10 +208,8 @@ class Plant:
 
     def soften(self, height_mm: ArrayLike) -> None:
         """Let every wall have been stretched to `height_mm` once, one for all or (n,); ideal rubber does not mind."""
-        stretch = np.broadcast_to(
-            (np.asarray(height_mm) - 1e3 * self._neck) / (2e3 * self.parameters.radius), len(self._state)
-        )
-        real_rest.soften(self._state, self.parameters, stretch)
+        stretch = (np.asarray(height_mm) - 1e3 * self._neck) / (2e3 * self.parameters.radius)
+        self._state["largest"] = np.maximum(self._state["largest"], stretch)
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy everything that changes, failures and noise generator included, for `restore`."""
@@ -226,6 +223,11 @@ class Plant:
     def stretch(self) -> NDArray[np.float64]:
         """λ = R/r0 of each bubble, (n,)."""
         return self._state["stretch"].copy()
+
+    @property
+    def largest_stretch(self) -> NDArray[np.float64]:
+        """The largest λ that each wall has seen, (n,): what real rubber is softened by."""
+        return self._state["largest"].copy()
 
     @property
     def height_mm(self) -> NDArray[np.float64]:

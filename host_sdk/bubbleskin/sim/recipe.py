@@ -1,15 +1,18 @@
 """From what somebody asks of a simulated board to the plant behind it."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
 from typing import TypedDict, Unpack
 
+import numpy as np
+
 from bubbleskin.contact.model import CompliantContact
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
-from bubbleskin.sim.parameters import RUBBERS, PlantParameters
+from bubbleskin.sim import plant_file
+from bubbleskin.sim.parameters import RUBBERS, PlantParameters, allowed
 from bubbleskin.sim.plant import Plant
 from bubbleskin.sim.tolerances import draw
 
@@ -22,7 +25,7 @@ SHEETS = {
 """μ, C2 and C3 in Pa: the display paper's fit, 25 and 50 % stiffer ones that snap through, and Ecoflex 00-30 in tension
 (L. Marechal et al., Soft Robotics Materials Database, 2021, fitted with C3 ≥ 0)."""
 
-WHOLE_LEAK = 5e-6
+WHOLE_LEAK = 5.3e-6
 """RTṁ per Pa gauge, m³/s, at which a bubble of the paper's rubber at 12 mm begins to lose all of its air in a second."""
 
 
@@ -66,8 +69,6 @@ def make_plant(data: ModuleType, seed: int, spread: float, contact: bool, **opti
     """The bubbles of a board, where its layout says; the rest as of `SimulatedBoard`."""
     n = data.BUBBLES
     parameters = make_parameters(n, seed, spread, **options)
-    if len(parameters.mu) != n:
-        raise InvalidInput(f"The plant's parameters are of {len(parameters.mu)} bubbles, {data.NAME} has {n}.")
     model = None
     if contact:
         p, layout = parameters, Layout.from_um(data.LAYOUT, data.PITCH_UM)
@@ -79,20 +80,19 @@ def make_plant(data: ModuleType, seed: int, spread: float, contact: bool, **opti
 def make_parameters(n: int, seed: int, spread: float, **options: Unpack[PlantOptions]) -> PlantParameters:
     """The figures of `n` bubbles; `InvalidInput` for what cannot be asked."""
     _check(spread, options)
-    whole = options.get("parameters")
-    if whole is not None:
-        return whole
+    if "parameters" in options:
+        return _checked(options["parameters"], n)
+    if "plant" in options:
+        return plant_file.read(options["plant"], n)
     nominal = PlantParameters.nominal(n)
     mu, c2, c3 = SHEETS[options.get("sheet", "paper")]
     asked = {"mu": mu, "c2": c2, "c3": c3, "leak": WHOLE_LEAK * options.get("leak", 0.0)}
-    supply = replace(
-        nominal.supply,
-        atmosphere=1e3 * options.get("atmosphere_kpa", 1e-3 * nominal.supply.atmosphere),
-        temperature=273.15 + options.get("gas_c", 20.0),
-    )
+    supply = replace(nominal.supply, temperature=273.15 + options.get("gas_c", 20.0))
+    if "atmosphere_kpa" in options:
+        supply = replace(supply, atmosphere=1e3 * options["atmosphere_kpa"])
     figures = replace(
         nominal,
-        **{name: 0.0 * nominal.mu + value for name, value in asked.items()},
+        **{name: np.full(n, value) for name, value in asked.items()},
         viscosity=options.get("viscosity", 1.0) * nominal.viscosity,
         rubber=options.get("rubber", "ideal"),
         supply=supply,
@@ -108,7 +108,27 @@ def _check(spread: float, options: PlantOptions) -> None:
         value = options.get(name, least)
         if not (isinstance(value, int | float) and math.isfinite(value) and least <= value <= most):
             raise InvalidInput(f"{name} is {value}; give a number from {least:g} to {most:g}, {unit}.")
-    whole = [name for name in _WHOLE if options.get(name) is not None]
+    whole = [name for name in _WHOLE if name in options]
     others = [name for name in options if name not in _WHOLE] + ["spread"] * bool(spread)
     if whole and (others or len(whole) > 1):
         raise InvalidInput(f"{whole[0]} says all of the plant; leave out {', '.join(whole[1:] + others)}.")
+
+
+def _checked(parameters: PlantParameters, n: int) -> PlantParameters:
+    for name in PlantParameters.each():
+        values = np.asarray(getattr(parameters, name))
+        if values.shape != (n,):
+            raise InvalidInput(
+                f"{name} of the plant's parameters has the shape {values.shape}; give {n} numbers, one for each bubble."
+            )
+        for value in values:
+            _refuse(name, value)
+    for name, value in asdict(parameters.supply).items():
+        _refuse(name, value)
+    return parameters
+
+
+def _refuse(name: str, value: float) -> None:
+    may = allowed(name, value)
+    if may:
+        raise InvalidInput(f"{name} of the plant's parameters is {value}; give {may}.")

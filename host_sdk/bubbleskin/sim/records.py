@@ -19,9 +19,9 @@ FAILURES = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sens
 SUPPLY_FAILURES = ("supply_stuck", "supply_flat", "supply_bias", "supply_absent", "relief_stuck")
 """The same of the reservoir."""
 
-REAL = ("node_air", "line_air", "stress", "quick", "slow", "worst")
+REAL = ("node_air", "line_air", "stress", "quick", "slow", "largest")
 """What only `rubber="real"` moves: air of node and of line and sphere (pV at the reference temperature, J), elastic stress
-and the overstress of both branches (Pa), and the largest energy density so far (J/m³)."""
+and the overstress of both branches (Pa), and the largest stretch so far."""
 
 STATE = np.dtype(
     [(name, "f8") for name in ("stretch", "pressure", "node", "membrane")]

@@ -10,11 +10,9 @@ import sys
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from bubbleskin.native import load, njit, resolve
 from bubbleskin.sim import devices, parameters, pneumatics, records
-from bubbleskin.sim.devices import read_sensors as _read_sensors
+from bubbleskin.sim.devices import pointer
 from bubbleskin.sim.devices import set_windows as _set_windows
 from bubbleskin.sim.devices import way_out as _way_out
 from bubbleskin.sim.pneumatics import OPEN_LINE, REFERENCE_TEMPERATURE, VISCOSITY_EXPONENT
@@ -48,12 +46,12 @@ def _orifice(p1, p2, warm1, warm2, conductance, b):  # type: ignore[no-untyped-d
 @njit(inline="always")
 def _wall(s, p, h):  # type: ignore[no-untyped-def]
     """Stresses of the wall at its new stretch, `h` s after the last ones, and the pressure that it holds."""
-    energy = _energy_density(s.stretch, p.mu, p.c2, p.c3)
     stress = _elastic_stress(s.stretch, p.mu, p.c2, p.c3)
-    if energy >= s.worst:
-        s.worst = energy
+    if s.stretch >= s.largest:
+        s.largest = s.stretch
     else:
-        stress *= _softening(energy, s.worst, p.mullins, p.mullins_width)
+        worst = _energy_density(s.largest, p.mu, p.c2, p.c3)
+        stress *= _softening(_energy_density(s.stretch, p.mu, p.c2, p.c3), worst, p.mullins, p.mullins_width)
     change = stress - s.stress
     s.quick = _overstress(s.quick, change, p.quick_strength, p.quick_time, h)
     s.slow = _overstress(s.slow, change, p.slow_strength, p.slow_time, h)
@@ -153,15 +151,12 @@ def _advance(bubbles, reservoir, touch, coils, dt, substeps, pump, dump):  # typ
 
 
 def _entries() -> dict[str, Any]:
-    """`advance` and `sense` for numba, with addresses in place of arrays; `Plant` says what they are given."""
+    """`advance` for numba, with addresses in place of arrays; `Plant` says what they are given."""
     import numba
-    from numba import carray, float64, int64, uint16, void
+    from numba import carray, float64, int64, void
 
-    def array_of(kind: Any) -> Any:
-        return numba.types.CPointer(numba.from_dtype(kind) if isinstance(kind, np.dtype) else kind)
-
-    state, constants, air, supply = map(array_of, (STATE, CONSTANTS, AIR, SUPPLY))
-    numbers, whole, words = map(array_of, (float64, int64, uint16))
+    state, constants, air, supply = map(pointer, (STATE, CONSTANTS, AIR, SUPPLY))
+    numbers, whole = map(pointer, (float64, int64))
     plant = (int64, state, constants, air, supply)
     where = (int64, int64, numbers, numbers, whole, numbers)
     resolve(globals())
@@ -176,19 +171,11 @@ def _entries() -> dict[str, Any]:
         coils = carray(fill_on, (n,)), carray(vent_on, (n,))
         _advance(bubbles, reservoir, touch, coils, dt, substeps, pump, dump != 0)
 
-    @numba.njit(void(*plant, numbers, float64, float64, words))
-    def sense(n, state, constants, air, supply, noise, pa_per_count, supply_pa_per_count, counts):  # type: ignore[no-untyped-def]
-        bubbles = carray(state, (n,)), carray(constants, (n,))
-        reservoir = carray(air, (1,)), carray(supply, (1,))
-        _read_sensors(
-            bubbles, reservoir, carray(noise, (n + 1,)), pa_per_count, supply_pa_per_count, carray(counts, (n + 1,))
-        )
-
-    return {"advance": advance, "sense": sense}
+    return {"advance": advance}
 
 
 @cache
-def compiled() -> dict[str, Any]:
-    """`advance` and `sense`, which are documented where `Plant` calls them."""
+def advance() -> Any:
+    """Steps a plant; `Plant` says what it is given."""
     modules = [sys.modules[__name__], rubber, gas, push, pneumatics, parameters, devices, records]
-    return load("real", "".join(map(inspect.getsource, modules)).encode(), _entries)
+    return load("real", "".join(map(inspect.getsource, modules)).encode(), _entries)["advance"]

@@ -26,29 +26,29 @@ def volume(stretch: NDArray[np.float64], parameters: PlantParameters) -> NDArray
     return parameters.tube_volume + 4 / 3 * np.pi * (parameters.radius * stretch) ** 3
 
 
-def fill(state: NDArray[Any], air: NDArray[Any], parameters: PlantParameters) -> None:
-    """Give every vessel the air that it holds at its pressure and its wall's temperature."""
+def begin(state: NDArray[Any], air: NDArray[Any], parameters: PlantParameters) -> None:
+    """Give walls their history, and every vessel the air that it holds at its pressure and its wall's temperature."""
+    supply = parameters.supply
+    state["largest"] = np.maximum(parameters.conditioned, state["stretch"])
+    air["air"] = air["pressure"] * supply.volume / (supply.temperature / REFERENCE_TEMPERATURE)
+    _fill_bubbles(state, parameters)
+
+
+def _fill_bubbles(state: NDArray[Any], parameters: PlantParameters) -> None:
     p, warm = parameters, parameters.supply.temperature / REFERENCE_TEMPERATURE
     state["node_air"] = state["node"] * p.node_volume / warm
     state["line_air"] = state["pressure"] * volume(state["stretch"], p) / warm
-    air["air"] = air["pressure"] * p.supply.volume / warm
 
 
 def stand(state: NDArray[Any], parameters: PlantParameters) -> None:
     """Put every bubble at rest at its stretch, as after a long time there: no overstress, all softening that it had."""
-    p, stretch, warm = parameters, state["stretch"], parameters.supply.temperature / REFERENCE_TEMPERATURE
-    energy = _energy_density(stretch, p.mu, p.c2, p.c3)
-    state["worst"] = np.maximum(state["worst"], energy)
-    state["stress"] = _elastic_stress(stretch, p.mu, p.c2, p.c3)
-    state["stress"] *= _softening(energy, state["worst"], p.mullins, p.mullins_width)
+    p, stretch = parameters, state["stretch"]
+    yeoh = p.mu, p.c2, p.c3
+    state["largest"] = np.maximum(state["largest"], stretch)
+    state["stress"] = _elastic_stress(stretch, *yeoh)
+    worst = _energy_density(state["largest"], *yeoh)
+    state["stress"] *= _softening(_energy_density(stretch, *yeoh), worst, p.mullins, p.mullins_width)
     state["quick"] = state["slow"] = 0.0
     state["membrane"] = _wall_pressure(stretch, state["stress"], p.thickness, p.radius)
     state["pressure"] = state["node"] = p.supply.atmosphere + state["membrane"]
-    state["node_air"] = state["node"] * p.node_volume / warm
-    state["line_air"] = state["pressure"] * volume(stretch, p) / warm
-
-
-def soften(state: NDArray[Any], parameters: PlantParameters, stretch: NDArray[np.float64]) -> None:
-    """Let every wall have been stretched as far as `stretch` once."""
-    p = parameters
-    state["worst"] = np.maximum(state["worst"], _energy_density(stretch, p.mu, p.c2, p.c3))
+    _fill_bubbles(state, p)

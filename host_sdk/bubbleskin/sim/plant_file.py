@@ -1,0 +1,113 @@
+"""A plant as a file: every figure of every bubble, to be read, changed by hand, and given to a simulated board.
+
+TOML, all in SI units and by the names of `PlantParameters` and `Supply`:
+
+    rubber = "real"
+    [supply]
+    atmosphere = 84000.0
+    [bubbles]
+    mu = [39620.0, 41200.0, …]     # one for each bubble,
+    viscosity = 900.0              # or one for all
+
+What a file leaves out is nominal. `write` leaves out nothing, and `read` of what it wrote is the same to the last bit.
+"""
+
+import tomllib
+from dataclasses import asdict, fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from bubbleskin.errors import InvalidInput
+from bubbleskin.sim.parameters import RUBBERS, PlantParameters, Supply, allowed
+
+_SECTIONS = ("rubber", "supply", "bubbles")
+
+
+def write(path: str | Path, parameters: PlantParameters, about: str = "") -> None:
+    """Write `parameters` to the file `path`; `about` goes into its first line. `InvalidInput` where that cannot be."""
+    lines = [
+        f"# {about or 'The plant of a simulated wristband'}: SI units, one number for each bubble; docs/simulator.md"
+    ]
+    lines += [f'rubber = "{parameters.rubber}"', "", "[supply]"]
+    lines += [f"{name} = {_text(value)}" for name, value in asdict(parameters.supply).items()]
+    lines += ["", "[bubbles]"]
+    for name in PlantParameters.each():
+        lines.append(f"{name} = [{', '.join(map(_text, getattr(parameters, name)))}]")
+    try:
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InvalidInput(f"The plant cannot be written to {path}: {error.strerror}.") from None
+
+
+def read(path: str | Path, n: int) -> PlantParameters:
+    """The plant in the file `path`, of `n` bubbles; `InvalidInput` says where it is wrong and what may stand there."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InvalidInput(f"The plant {path} cannot be read: {error.strerror}.") from None
+    except UnicodeDecodeError:
+        raise InvalidInput(
+            f"The plant {path} is no text; `skin.simulated.write_plant({str(path)!r})` makes one."
+        ) from None
+    try:
+        said = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInput(f"The plant {path} is no TOML: {error}.") from None
+    for name in said:
+        if name not in _SECTIONS:
+            _unknown(path, name, "at its top", _SECTIONS)
+    rubber = said.get("rubber", RUBBERS[0])
+    if rubber not in RUBBERS:
+        raise InvalidInput(f"The plant {path} has rubber = {rubber!r}; choose one of {', '.join(RUBBERS)}.")
+    supply = _section(path, said, "supply", [f.name for f in fields(Supply)])
+    bubbles = _section(path, said, "bubbles", PlantParameters.each())
+    nominal = PlantParameters.nominal(n)
+    figures: dict[str, Any] = {name: getattr(nominal, name) for name in PlantParameters.each()}
+    figures |= {name: _numbers(path, name, value, n) for name, value in bubbles.items()}
+    return PlantParameters(
+        **figures, supply=Supply(**{name: _number(path, name, value) for name, value in supply.items()}), rubber=rubber
+    )
+
+
+def _section(path: str | Path, said: dict[str, Any], section: str, known: list[str]) -> dict[str, Any]:
+    found = said.get(section, {})
+    if not isinstance(found, dict):
+        raise InvalidInput(
+            f"The plant {path} has {section} as a figure; write [{section}] on a line, and its figures below it."
+        )
+    for name in found:
+        if name not in known:
+            _unknown(path, name, f"in [{section}]", known)
+    return found
+
+
+def _text(value: float) -> str:
+    return repr(float(value))
+
+
+def _unknown(path: str | Path, name: str, where: str, known: Any) -> NoReturn:
+    near = get_close_matches(name, known, 1)
+    may = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
+    raise InvalidInput(f"The plant {path} has {name!r} {where}, which nothing there is called; {may}")
+
+
+def _numbers(path: str | Path, name: str, value: Any, n: int) -> np.ndarray:
+    if not isinstance(value, list):
+        return np.full(n, _number(path, name, value))
+    if len(value) != n:
+        raise InvalidInput(
+            f"The plant {path} has {len(value)} numbers for {name}; give {n}, one for each bubble, or one for all."
+        )
+    return np.array([_number(path, name, one) for one in value])
+
+
+def _number(path: str | Path, name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidInput(f"The plant {path} has {name} = {value!r}, which is not a number.")
+    may = allowed(name, value)
+    if may:
+        raise InvalidInput(f"The plant {path} has {name} = {value}; give {may}.")
+    return float(value)
