@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-GENERATORS := constants nominal_table golden_vectors protocol_page cli_page boards_page state_page fault_page demo_picture membrane_pictures contact_pictures
+GENERATORS := constants nominal_table golden_vectors protocol_page cli_page boards_page state_page fault_page plant_page demo_picture membrane_pictures contact_pictures
 EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
 EMULATED := --target rp2040://wristband7?contact=0
 

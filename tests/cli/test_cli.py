@@ -61,6 +61,8 @@ def assert_one_sentence(outcome, status, *words):
         (["monitor", "--rate", "0", *SIM], ["rate_hz is 0"]),
         (["monitor", "--rate", "nan", *SIM], ["rate_hz is nan"]),
         (["sim", "--spread", "2"], ["spread is 2"]),
+        (["sim", "--plant", "nowhere.toml"], ["nowhere.toml"]),
+        (["sim", "--rubber", "wood"], ["wood", "real"]),
         (["sim", "--port", "70000"], ["70000"]),
         (["dance"], ["dance", "--help"]),
         (["bench", "everything"], ["everything"]),

@@ -234,6 +234,7 @@ def test_what_a_file_leaves_out_is_nominal_and_one_number_is_for_all(tmp_path):
         ("[bubbles]\nmu = true", "has mu = True, which is not a number."),
         ("[bubbles]\nmu = -1.0", "has mu = -1.0; give a finite number, more than 0."),
         ("[bubbles]\nleak = -1.0", "has leak = -1.0; give a finite number, 0 or more."),
+        ("[bubbles]\nmullins = 1.0", "has mullins = 1.0; give a number from 0 to less than 1."),
         ("[bubbles]\nneck = nan", "has neck = nan; give a finite number."),
         ("[supply]\nvolume = inf", "has volume = inf; give a finite number, more than 0."),
     ],

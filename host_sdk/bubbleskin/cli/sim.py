@@ -14,9 +14,20 @@ from bubbleskin.cli.options import Board, as_json
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of sensor noise and spread.")
 @click.option("--spread", type=float, default=0.0, show_default=True, help="How much parts differ: 0.1 for ± 10 %.")
+@click.option("--rubber", type=click.Choice(["ideal", "real"]), help="What the bubbles are made of.  [default: ideal]")
+@click.option("--plant", type=click.Path(), help="The plant, from a file that `skin.simulated.write_plant` wrote.")
 @click.option("--micropython", is_flag=True, help="Run the firmware in a real MicroPython.")
 @as_json
-def sim(board: str, port: int | None, seed: int, spread: float, micropython: bool, json: bool) -> None:
+def sim(
+    board: str,
+    port: int | None,
+    seed: int,
+    spread: float,
+    rubber: str | None,
+    plant: str | None,
+    micropython: bool,
+    json: bool,
+) -> None:
     """Serve a simulated BOARD, by its name or the path of its file, in real time, until Ctrl-C.
 
     Any program can open it with pyserial: at the pseudo-terminal or the socket:// URL that is printed. One has it at a
@@ -26,7 +37,9 @@ def sim(board: str, port: int | None, seed: int, spread: float, micropython: boo
     from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve
 
     scheme = "micropython" if micropython else "sim"
-    transport, simulated = open_board(scheme, board, {"seed": str(seed), "spread": str(spread)})
+    options = {"seed": str(seed), "spread": str(spread)}
+    options |= {name: value for name, value in (("rubber", rubber), ("plant", plant)) if value is not None}
+    transport, simulated = open_board(scheme, board, options)
     try:
         end = PtyEnd() if port is None else TcpEnd(port)
         try:

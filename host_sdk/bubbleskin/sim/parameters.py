@@ -159,6 +159,7 @@ MAY_BE_ZERO = (
     ),
 )
 """Figures that may be negative, and those that may be nothing; all others are more than 0."""
+BELOW_ONE = ("critical_ratio", "mullins")
 
 
 def allowed(name: str, value: float) -> str:
@@ -167,6 +168,8 @@ def allowed(name: str, value: float) -> str:
         return "" if math.isfinite(value) else "a finite number"
     if name == "relief_pressure" and value == math.inf:
         return ""
+    if name in BELOW_ONE:
+        return "" if 0 <= value < 1 else "a number from 0 to less than 1"
     if name in MAY_BE_ZERO:
         return "" if math.isfinite(value) and value >= 0 else "a finite number, 0 or more"
     return "" if math.isfinite(value) and value > 0 else "a finite number, more than 0"

@@ -82,7 +82,10 @@ SUPPLY = (
     Tolerance("sensor_noise", share=0.20, meaning="the same"),
     Tolerance("heat_time", share=0.20, meaning="shape"),
 )
-"""What differs between supplies where the rubber is real; the sensor's offset, ± 300 Pa, always."""
+"""What differs between supplies where the rubber is real."""
+
+SUPPLY_OFFSET = Tolerance("sensor_offset", absolute=300.0, meaning="Pa")
+"""And whatever the rubber."""
 
 
 def draw(parameters: _Figures, spread: float, seed: int, *, springs: float | None = None) -> _Figures:
@@ -98,8 +101,7 @@ def draw(parameters: _Figures, spread: float, seed: int, *, springs: float | Non
     if spread:
         rng = np.random.default_rng(seed)
         drawn = {row.name: _value(row, getattr(parameters, row.name), spread, rng, n) for row in IDEAL}
-        offset = Tolerance("sensor_offset", absolute=300.0)
-        supply["sensor_offset"] = float(_value(offset, parameters.supply.sensor_offset, spread, rng, None))
+        supply["sensor_offset"] = float(_value(SUPPLY_OFFSET, parameters.supply.sensor_offset, spread, rng, None))
     if spread and real:
         for row in REAL:
             drawn[row.name] = _value(row, getattr(parameters, row.name), spread, _stream(seed, row.name), n)
