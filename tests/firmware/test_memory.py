@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from pathlib import Path
 
 import pytest
 
@@ -13,72 +14,20 @@ from bubble_protocol.frame import FRAME_MAX, HEADER, finish_frame, put_header
 from bubble_protocol.schema import messages, sequences
 from bubbleskin.link import message
 
+TOOLS = str(Path(__file__).parents[2] / "tools/stress")
 SCRIPT = """
-import gc, micropython
+import gc, micropython, sys
 from bubble_firmware import boards
 from bubble_firmware.app import App
-from bubble_firmware.drivers.flash import Memory
-from bubble_firmware.hal.base import Hal
+sys.path.append({tools!r})
+from following_hal import FollowingHal
 
-class FollowingHal(Hal):
-    # Counts that follow the valves, with noise; the requests over and over, a few bytes in every tick and between ticks.
+class TalkingHal(FollowingHal):
+    # The requests over and over, a few bytes in every tick and between ticks.
     def __init__(self, board, requests):
         super().__init__(board)
-        self.n = board.BUBBLES
-        self.zero = board.SENSOR_ZERO
-        self.level = bytearray(2 * self.n)
-        self.flow = bytearray(self.n)  # what flows shows in the tube
-        self.supply = 2550  # what is taken shows in the reservoir
         self.requests = requests
-        self.at = 0
-        self.noise = 1
-        self.fills = self.vents = self.rests = self.sent = 0
-        self.broken = False
-        self.safe = 0
-        self.flash = Memory(16384)
-
-    def read_sensors(self, counts):
-        if self.broken:
-            raise OSError(5)
-        noise = self.noise
-        level = self.level
-        for i in range(self.n):
-            noise = noise * 75 % 65537
-            counts[i] = self.zero + (level[2 * i] | level[2 * i + 1] << 8) + (noise & 3) + self.flow[i]
-        counts[self.n] = self.supply + (noise & 15)
-        self.noise = noise
-
-    def write_outputs(self, pulses, pump, dump):
-        level = self.level
-        self.supply += pump >> 12
-        for i in range(self.n):
-            self.supply -= pulses[2 * i] >> 11
-            height = level[2 * i] | level[2 * i + 1] << 8
-            fill = pulses[2 * i]
-            vent = pulses[2 * i + 1]
-            if fill:
-                self.fills += 1
-            elif vent:
-                self.vents += 1
-            else:
-                self.rests += 1
-            slow = 9 if height > 900 else 5
-            height += (fill + 500 >> slow) - (vent + 500 >> slow)
-            if height < 0:
-                height = 0
-            if height > 1900:
-                height = 1900
-            self.flow[i] = 0 if vent else 250 if fill else 90
-            level[2 * i] = height & 255
-            level[2 * i + 1] = height >> 8
-
-        if self.supply > 2550:
-            self.supply = 2550
-        if self.supply < 2200:
-            self.supply = 2200
-
-    def safe_outputs(self):
-        self.safe += 1
+        self.at = self.sent = 0
 
     def receive(self, buffer):
         requests = self.requests
@@ -95,9 +44,6 @@ class FollowingHal(Hal):
         self.sent += 1
         return self.sent & 15 != 0
 
-    def phase_us(self):
-        return 100
-
 def ticks(app, count):
     while count:
         count -= 1
@@ -112,7 +58,7 @@ def measure(app, hal):
     ticks(app, {ticks})
     return gc.mem_alloc() - before
 
-hal = FollowingHal(boards.load({board!r}), bytes.fromhex({requests!r}))
+hal = TalkingHal(boards.load({board!r}), bytes.fromhex({requests!r}))
 app = App(boards.load({board!r}), hal)
 ticks(app, 300)
 gc.collect()
@@ -295,7 +241,7 @@ def test_the_tick_allocates_nothing(micropython, board, sequence):
     requests = b"".join(rounds(sequence, n))
     ticks = 600 if sequence == SAVING else 4000
     said, wear, failing = micropython(
-        SCRIPT.format(board=board, requests=requests.hex(), bytes_per_tick=9, ticks=ticks)
+        SCRIPT.format(tools=TOOLS, board=board, requests=requests.hex(), bytes_per_tick=9, ticks=ticks)
     ).splitlines()
     grown, exceptions, good, sent, fills, vents, rests, events = map(int, said.split())
     assert exceptions == 0, "MemoryError while the heap was locked"

@@ -7,12 +7,14 @@ import os
 from functools import partial
 
 import pytest
-from hypothesis import HealthCheck, Phase, settings
+from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
-SCENARIOS = int(os.environ.get("BUBBLESKIN_SCENARIOS", "400"))
-"""Of the slow test: `BUBBLESKIN_SCENARIOS=20000 pytest tests/promises -m slow` for a longer look."""
+SCENARIOS = int(os.environ.get("BUBBLESKIN_SCENARIOS", "2000"))
+"""Of the slow test: `BUBBLESKIN_SCENARIOS=20000 pytest -n 2 tests/promises -m slow` for a longer look."""
+SHARES = 8
+"""Tests that the scenarios are shared out to, each with other ones, so that they can run beside each other."""
 FEW = 25
 STEPS = 14
 
@@ -126,10 +128,10 @@ class Promises(RuleBasedStateMachine):
             self.world.board.close()
 
 
-def look(world, scenarios, spoil=None, phases=tuple(Phase)):
-    """At so many scenarios; `spoil` takes a rule out of the firmware after each boot."""
+def look(world, scenarios, spoil=None, phases=tuple(Phase), share=0):
+    """At so many scenarios, others for every `share`; `spoil` takes a rule out of the firmware after each boot."""
     run_state_machine_as_test(
-        type("Scenario", (Promises,), {"make": staticmethod(partial(world, host=spoil))}),
+        seed(share)(type("Scenario", (Promises,), {"make": staticmethod(partial(world, host=spoil))})),
         settings=settings(
             max_examples=scenarios,
             stateful_step_count=STEPS,
@@ -145,9 +147,10 @@ def test_promises_are_kept(world):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_promises_are_kept_for_long(world):
-    look(world, SCENARIOS)
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("share", range(1, SHARES + 1))
+def test_promises_are_kept_for_long(share, world):
+    look(world, SCENARIOS // SHARES, share=share)
 
 
 # Firmware with one rule taken out: each must be found, by the promise that it breaks.

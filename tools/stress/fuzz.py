@@ -18,7 +18,10 @@ PACKAGES = ["bubble_protocol", "bubble_firmware"]
 WATCHED = [
     "bubble_protocol.frame",
     *(f"bubble_firmware.{name}" for name in ("app", "commands", "link.server", "link.receive_window", "link.reply")),
-    *(f"bubble_firmware.handlers.{name}" for name in ("session", "shape", "faults", "settings", "sequence", "tables", "trim")),
+    *(
+        f"bubble_firmware.handlers.{name}"
+        for name in ("session", "shape", "faults", "settings", "sequence", "tables", "trim")
+    ),
 ]
 """Modules whose branches lead the search: it does not begin where one of them is not followed."""
 CORPUS = Path(__file__).parents[2] / "tests/firmware/corpus.txt"
