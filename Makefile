@@ -9,7 +9,7 @@ EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz generate lock clean
+.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz hostile generate lock clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -74,6 +74,9 @@ soak: setup ## a million commands over a line that fails, ten minutes
 
 fuzz: setup ## look for bytes that harm the firmware, ten minutes; keeps what it finds in tests/firmware/corpus.txt
 	$(BIN)/python tools/stress/fuzz.py
+
+hostile: setup micropython ## 100,000 requests that nobody should send, for each board on MicroPython, three minutes
+	$(BIN)/python tools/stress/hostile.py
 
 bench: setup ## measure speeds
 	$(BIN)/bubbleskin bench

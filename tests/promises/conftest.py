@@ -46,6 +46,9 @@ class World:
     """A board, its host and its failures; `run` lets time pass and judges every tick: `World.Broken` where a promise is."""
 
     Broken = BrokenPromiseError
+    promises = (
+        "pressure", "height", "reservoir", "silence", "emergency stop", "on-time", "isolation", "latching", "only the ill",
+    )  # fmt: skip
 
     def __init__(self, board="wristband7", *, seed=0, contact=False, spread=0.0, host=None):
         self.board = SimulatedBoard(board, seed=seed, contact=contact, spread=spread)
@@ -216,6 +219,7 @@ class World:
         self.faults = told
 
     def require(self, kept, promise, what):
+        assert promise in self.promises
         if not kept:
             raise BrokenPromiseError(f"{promise}: {what}, {self.board.time:.3f} s after the start")
 

@@ -153,7 +153,7 @@ def test_promises_are_kept_for_long(share, world):
     look(world, SCENARIOS // SHARES, share=share)
 
 
-# Firmware with one rule taken out: each must be found, by the promise that it breaks.
+# Firmware with one rule taken out: the search finds it. That the judge sees every rule missing is in test_controls.py.
 
 
 def deaf_deadman(app):
