@@ -17,6 +17,7 @@ from bubbleskin.device.settings import Setting, changes, settings_of
 from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
 from bubbleskin.device.trim import Trim
+from bubbleskin.device.trim import check as check_trim
 from bubbleskin.errors import DeviceFault, InvalidInput
 from bubbleskin.fault_guide import remedies
 from bubbleskin.layout import Layout
@@ -254,9 +255,14 @@ class AsyncSkin:
         if rows:
             await self.link.call("SETTING_WRITE", (), rows)
 
-    async def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
+    async def upload_tables(
+        self, tables: "Sequence[Table] | Table | Calibration", save: bool = False, *, anyway: bool = False
+    ) -> None:
         """See `Skin.upload_tables`."""
-        await device_tables.upload(self.link, device_tables.one_per_bubble(tables, self.info))
+        each = device_tables.one_per_bubble(tables, self.info)
+        if not anyway:
+            device_tables.check(each, self.info)
+        await device_tables.upload(self.link, each)
         if save:
             await self.save()
 
@@ -264,9 +270,12 @@ class AsyncSkin:
         """See `Skin.trim`."""
         return Trim.of(await self.link.call("TRIM_READ"))
 
-    async def upload_trim(self, trim: Trim, save: bool = False) -> None:
+    async def upload_trim(self, trim: Trim, save: bool = False, *, anyway: bool = False) -> None:
         """See `Skin.upload_trim`."""
-        await self.link.call("TRIM_WRITE", (), trim.rows(self.info.bubbles))
+        rows = trim.rows(self.info.bubbles)
+        if not anyway:
+            check_trim(trim)
+        await self.link.call("TRIM_WRITE", (), rows)
         if save:
             await self.save()
 

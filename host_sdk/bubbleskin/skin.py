@@ -221,21 +221,27 @@ class Skin:
         """Change settings, all or none: `configure(deadman_vent=5.0)`. `InvalidInput` beyond the wristband's limits."""
         run_sync(self._skin.configure(**wanted))
 
-    def upload_tables(self, tables: "Sequence[Table] | Table | Calibration", save: bool = False) -> None:
+    def upload_tables(
+        self, tables: "Sequence[Table] | Table | Calibration", save: bool = False, *, anyway: bool = False
+    ) -> None:
         """Use other height to pressure tables, until the device restarts; all or none are taken.
 
         `tables`: one per bubble in layout order, one for all, or a calibration of this kind of board. With `save` they are
-        kept for good, see there.
+        kept for good, see there. Tables that are none of rubber, or contradict each other, are `InvalidInput`; with `anyway`
+        only the device's limits of pressure and air hold.
         """
-        run_sync(self._skin.upload_tables(tables, save))
+        run_sync(self._skin.upload_tables(tables, save, anyway=anyway))
 
     def trim(self) -> Trim:
         """What sets each bubble apart besides its table: sensor zero, dead times, flow."""
         return run_sync(self._skin.trim())
 
-    def upload_trim(self, trim: Trim, save: bool = False) -> None:
-        """Use another trim, until the device restarts; only while it is vented. With `save` it is kept for good."""
-        run_sync(self._skin.upload_trim(trim, save))
+    def upload_trim(self, trim: Trim, save: bool = False, *, anyway: bool = False) -> None:
+        """Use another trim, until the device restarts; only while it is vented. With `save` it is kept for good.
+
+        Flows of one board's restrictors that contradict each other are `InvalidInput`, but with `anyway`.
+        """
+        run_sync(self._skin.upload_trim(trim, save, anyway=anyway))
 
     def save(self) -> StoreInfo:
         """Keep the tables, trim and settings in use without power, for every start from now on; returns the store's state.

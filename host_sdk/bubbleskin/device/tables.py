@@ -16,6 +16,13 @@ if TYPE_CHECKING:  # the membrane loads scipy, for which a script that only show
     from bubbleskin.membrane.calibration import Calibration
     from bubbleskin.membrane.table import Table
 
+CHECKED_FROM_MM = 6.0
+"""Below, near rest, pressure rises steeply: a wall that is a little thicker changes the share a lot."""
+BENT_MOST = 2.5
+"""Of a table's pressures, as shares of the nominal bubble's, the greatest to the least: Ecoflex 00-30 has 2.3."""
+APART_MOST = 1.5
+"""Of one bubble's pressure to the middle one's: walls that differ by a fifth do not make it."""
+
 
 def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) -> "list[Table]":
     """A table for each bubble of this device. `InvalidInput` where there are more or fewer, or they are another board's."""
@@ -29,6 +36,37 @@ def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) 
     if len(each) != info.bubbles:
         raise InvalidInput(f"{len(each)} tables for {info.bubbles} bubbles: give one per bubble, or one for all.")
     return each
+
+
+def check(tables: "Sequence[Table]", info: Info) -> None:
+    """`InvalidInput` where tables are none of rubber, or contradict each other: air is reckoned and height is taken from them.
+
+    Compared from 6 mm to the board's greatest height with the bubble of the paper. The device bounds what it can know, pressure
+    and air; whether a shape is a bubble's it cannot.
+    """
+    from bubbleskin.membrane.balloon import YeohBalloon
+
+    heights_mm = np.arange(CHECKED_FROM_MM, info.height_max_mm + 0.25, 0.5)
+    nominal = YeohBalloon()
+    usual = np.array([nominal.pressure_at_height(height * 1e-3) for height in heights_mm])
+    shares = np.array([table.pressure_at(heights_mm * 1e3) for table in tables]) / usual
+    for bubble, share in enumerate(shares):
+        low, high = int(share.argmin()), int(share.argmax())
+        if share[high] > BENT_MOST * share[low]:
+            raise InvalidInput(
+                f"The table of bubble {bubble} is not one of rubber: of the nominal bubble's pressure it has {share[low]:.2f} at "
+                f"{heights_mm[low]:g} mm and {share[high]:.2f} at {heights_mm[high]:g} mm; they differ by at most a factor "
+                f"of {BENT_MOST:g} for known materials. Make it with `build_table` or from measurements; anyway=True uploads it."
+            )
+    middle = np.median(shares, axis=0)
+    apart = np.maximum(shares / middle, middle / shares)
+    bubble, at = np.unravel_index(apart.argmax(), apart.shape)
+    if apart[bubble, at] > APART_MOST:
+        raise InvalidInput(
+            f"The tables contradict each other: bubble {bubble} has {shares[bubble, at] * usual[at] / 1e3:.1f} kPa at "
+            f"{heights_mm[at]:g} mm and the middle one {middle[at] * usual[at] / 1e3:.1f} kPa; bubbles of one sheet are within a "
+            f"factor of {APART_MOST:g}. Measure the sheet again; anyway=True uploads them."
+        )
 
 
 async def upload(link: Link, tables: "Sequence[Table]") -> None:
