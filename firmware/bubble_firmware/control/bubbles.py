@@ -10,6 +10,7 @@ from array import array
 from bubble_firmware.control import curve, flow, trajectory
 from bubble_firmware.control.dose import dose
 from bubble_firmware.control.estimate import estimate
+from bubble_firmware.control.reference import reference
 from bubble_firmware.control.table import KNOTS_MAX
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr32, uint
 
@@ -22,28 +23,33 @@ if TYPE_CHECKING:
 
 # [constants] bubble_firmware.control.state_layout: used
 _SENSOR_ZERO = const(0)
-_OPENS_US = const(1)
-_CLOSES_US = const(2)
-_FLOW_GAIN = const(3)
-_PRESSURE = const(4)
-_QUIESCENT = const(6)
-_DECIMATION_LEFT = const(7)
-_AIR = const(10)
-_FAULTS = const(21)
-_STATUS = const(22)
-_TARGET = const(23)
-_HEIGHT = const(24)
-_HEIGHT_SEGMENT = const(25)
-_SETPOINT = const(28)
-_SETPOINT_SEGMENT = const(29)
-_RAMP_START = const(32)
-_RAMPING = const(33)
-_HOLD_OUTPUT = const(34)
-_FIRST_SEGMENT = const(35)
-_LAST_SEGMENT = const(36)
-_LOWEST_PRESSURE = const(37)
-_ROW_WORDS = const(41)
-_KNOT_AIR = const(1)
+_FILL_OPENS_US = const(1)
+_FILL_CLOSES_US = const(2)
+_FILL_GAIN = const(3)
+_VENT_OPENS_US = const(4)
+_VENT_CLOSES_US = const(5)
+_VENT_GAIN = const(6)
+_PRESSURE = const(7)
+_QUIESCENT = const(9)
+_AIR = const(13)
+_STATUS = const(25)
+_FAULTS = const(26)
+_TARGET = const(27)
+_HEIGHT = const(28)
+_HEIGHT_SEGMENT = const(29)
+_SETPOINT = const(30)
+_SETPOINT_SEGMENT = const(33)
+_RAMP_START = const(37)
+_RAMPING = const(38)
+_FIRST_SEGMENT = const(41)
+_LAST_SEGMENT = const(42)
+_AIR_SD = const(46)
+_CURVE_ERROR_SD = const(48)
+_DWELL_SLOPE = const(53)
+_FLOW_SD = const(56)
+_CURVE_SD = const(57)
+_ROW_WORDS = const(59)
+_KNOT_VOLUME = const(1)
 _KNOT_WORDS = const(5)
 _BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
@@ -56,16 +62,17 @@ _PULSE_MIN_US = const(7)
 _QUIET_US = const(8)
 _TUBE_PA = const(9)
 _GAIN_P = const(10)
-_GAIN_I = const(11)
-_GAIN_D = const(12)
-_DEADBAND_UM = const(13)
-_SETTLED_UM = const(14)
-_REST_UM = const(15)
-_RAMP_DONE = const(17)
-_RAMP_TICKS = const(18)
-_RAMP_SHARE = const(19)
-_ROOTS = const(20)
-_ROWS = const(150)
+_GAIN_D = const(11)
+_DEADBAND_UM = const(12)
+_SETTLED_UM = const(13)
+_REST_UM = const(14)
+_RAMP_DONE = const(16)
+_RAMP_TICKS = const(17)
+_RAMP_SHARE = const(18)
+_SECOND = const(22)
+_ROOTS = const(24)
+_ROWS = const(154)
+_ATMOSPHERE = const(101325)
 # [end of constants]
 
 _WHOLE_WAY = const(32768)  # in the shares of `advance`
@@ -124,10 +131,10 @@ class Bubbles:
         self.use_tables()
         rows = self.rows
         for at in range(0, n * _ROW_WORDS, _ROW_WORDS):
-            rows[at + _AIR] = self.curves[rows[at + _FIRST_SEGMENT] // 4 + _KNOT_AIR]
+            rows[at + _AIR] = (_ATMOSPHERE >> 4) * self.curves[rows[at + _FIRST_SEGMENT] // 4 + _KNOT_VOLUME] // 4000
 
         # A default is a local: an attribute costs the chip 2.5 µs. More than 11 locals and values, and a call allocates.
-        work = (self.state, estimate, trajectory.move_setpoints, dose, self.pulses)
+        work = (self.state, estimate, reference, trajectory.move_setpoints, dose, self.pulses)
 
         def step(
             counts: "array[int]",
@@ -136,9 +143,11 @@ class Bubbles:
             rows: memoryview = self.rows,
             work: "tuple[Any, ...]" = work,
         ) -> None:
-            work[1](rows, work[0], counts, control_mode)
-            work[2](rows, work[0])
-            work[3](rows, work[0], work[4], supply_pa, control_mode)
+            chosen = work[1](rows, work[0], counts, supply_pa, control_mode)
+            if chosen:
+                work[2](rows, work[0], chosen)
+            work[3](rows, work[0])
+            work[4](rows, work[0], work[5], control_mode)
 
         self.step = step
 
@@ -156,23 +165,25 @@ class Bubbles:
         state[_QUIET_US] = board.QUIET_US
         state[_TUBE_PA] = board.TUBE_PA_PER_FLOW
         state[_GAIN_P] = board.GAIN_P
-        state[_GAIN_I] = board.GAIN_I
         state[_GAIN_D] = board.GAIN_D
         state[_DEADBAND_UM] = board.DEADBAND_UM
         state[_SETTLED_UM] = board.SETTLED_UM
         state[_RAMP_DONE] = state[_RAMP_TICKS] = 1
         state[_RAMP_SHARE] = 4096
+        state[_SECOND] = 1000000 // board.TICK_US
         for index, root in enumerate(flow.roots(board.CRITICAL_RATIO)):
             state[_ROOTS + index] = root
         rows = self.rows
         for at in range(0, self.count * _ROW_WORDS, _ROW_WORDS):
             rows[at + _SENSOR_ZERO] = board.SENSOR_ZERO
-            rows[at + _OPENS_US] = board.VALVE_OPENS_US
-            rows[at + _CLOSES_US] = board.VALVE_CLOSES_US
-            rows[at + _FLOW_GAIN] = flow.flow_gain(board)
+            rows[at + _FILL_OPENS_US] = rows[at + _VENT_OPENS_US] = board.VALVE_OPENS_US
+            rows[at + _FILL_CLOSES_US] = rows[at + _VENT_CLOSES_US] = board.VALVE_CLOSES_US
+            rows[at + _FILL_GAIN] = rows[at + _VENT_GAIN] = flow.flow_gain(board)
+            rows[at + _FLOW_SD] = 393
+            rows[at + _CURVE_SD] = rows[at + _CURVE_ERROR_SD] = 6554
+            rows[at + _AIR_SD] = 200
             rows[at + _TARGET] = rows[at + _RAMP_START] = board.HEIGHT_REST_UM
             rows[at + _HEIGHT] = rows[at + _SETPOINT] = board.HEIGHT_REST_UM << 4
-            rows[at + _DECIMATION_LEFT] = -1
 
     def use_tables(self) -> None:
         """Take up the tables in use, after a commit. The air stays; what height it means is found anew."""
@@ -186,9 +197,8 @@ class Bubbles:
             )
             rows[at + _FIRST_SEGMENT] = 4 * first
             rows[at + _LAST_SEGMENT] = 4 * (first + _KNOT_WORDS * (knots - 2))
-            self._tables.read_pressures(i, rows, at + _LOWEST_PRESSURE)
             rows[at + _HEIGHT_SEGMENT] = rows[at + _SETPOINT_SEGMENT] = 4 * first
-            rows[at + _QUIESCENT] = rows[at + _HOLD_OUTPUT] = 0
+            rows[at + _QUIESCENT] = rows[at + _DWELL_SLOPE] = 0
             rows[at + _RAMPING] = 1  # the setpoint's air is to be found again
 
     def set_targets(self, heights: "Words", at: int, ticks: int) -> None:

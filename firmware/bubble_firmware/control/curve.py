@@ -1,10 +1,9 @@
 # mypy: disable-error-code="valid-type,index,operator,arg-type"
-"""What a bubble's table means in air: worked out once, so that the tick need not divide.
+"""What a bubble's table means in volume: worked out once, so that the tick need not divide.
 
-A *curve* is a table's knots with more said at each, `state_layout` names the places: height, air, pressure, and for the
-segment that begins there air per height and its reciprocal. Air is linear in height between two
-knots; a segment longer than 1 mm is divided, so that this costs less than 35 µm. Air always rises, by at least
-1 µJ/µm, whatever the table.
+A *curve* is a table's knots with more said at each, `state_layout` names the places: height, volume of bubble and line,
+pressure, and for the segment that begins there volume per height and its reciprocal. Volume is linear in height between two
+knots; a segment longer than 1 mm is divided, so that this costs less than 35 µm.
 """
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
@@ -12,17 +11,14 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32
 KNOTS_MAX = 80  # of a curve: 64 of a table, and 15 where no segment is longer than 1024 µm
 
 _LONGEST = const(1024)  # µm
-_RISE_MIN = const(1)  # µJ/µm
-_SLOPE_MAX = const(1 << 20)  # *256: steeper, and a deadband's air is beyond 32 bits
 
 # [constants] bubble_firmware.control.state_layout: used
 _KNOT_HEIGHT = const(0)
-_KNOT_AIR = const(1)
+_KNOT_VOLUME = const(1)
 _KNOT_PRESSURE = const(2)
 _KNOT_SLOPE = const(3)
 _KNOT_RECIPROCAL = const(4)
 _KNOT_WORDS = const(5)
-_ATMOSPHERE = const(101325)
 # [end of constants]
 
 
@@ -33,7 +29,6 @@ def build(curve: ptr32, knot: ptr16, at: int, first: int, size: int, dead: int) 
     `dead` is the volume of the line, 1/64 mm³.
     """
     made = 0
-    air = 0
     i = 2 * first
     end = i + 2 * (size - 1)
     while i <= end:
@@ -47,24 +42,22 @@ def build(curve: ptr32, knot: ptr16, at: int, first: int, size: int, dead: int) 
             if piece:
                 h += (knot[i + 2] - h) * piece // pieces
                 p += (knot[i + 3] - p) * piece // pieces
-            # Sphere of diameter h: V = pi/6 h³. Volume in 1/64 mm³, pressure in 16 Pa.
+            # Sphere of diameter h: V = pi/6 h³, in 1/64 mm³.
             square = h * h >> 12
             volume = ((square * h >> 12) * 2303 >> 12) + dead
-            content = (p + _ATMOSPHERE >> 4) * volume // 4000
             if made:
                 before = at - _KNOT_WORDS
                 run = h - (curve[before + _KNOT_HEIGHT] >> 4)
-                if content < air + run * _RISE_MIN:
-                    content = air + run * _RISE_MIN
-                slope = (content - air << 8) // run
-                if slope > _SLOPE_MAX:
-                    slope = _SLOPE_MAX
+                rise = volume - curve[before + _KNOT_VOLUME]
+                if rise < run:  # of heights that no bubble has: their slope's reciprocal must stay within 32 bits
+                    rise = run
+                    volume = curve[before + _KNOT_VOLUME] + rise
+                slope = (rise << 8) // run
                 curve[before + _KNOT_SLOPE] = slope
                 curve[before + _KNOT_RECIPROCAL] = (1 << 28) // slope
             curve[at + _KNOT_HEIGHT] = h << 4
-            curve[at + _KNOT_AIR] = content
+            curve[at + _KNOT_VOLUME] = volume
             curve[at + _KNOT_PRESSURE] = p
-            air = content
             at += _KNOT_WORDS
             made += 1
             piece += 1

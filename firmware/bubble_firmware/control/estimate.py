@@ -1,14 +1,13 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
-"""First pass over all bubbles: limits of the sensors, and the air and height of each.
+# mypy: disable-error-code="valid-type,index,operator,arg-type"
+"""First pass over all bubbles: from sensor counts to pressure, air and height.
 
-The controlled quantity is *air*. The valves' air is counted, and the count is corrected by the pressure sensor whenever no
-air flows: an observer, predict by dose, correct by measurement, through the bubble's curve, see `curve`. Height is a single
-valued function of air even where pressure hardly changes with height.
+Air is metered: what the valves have brought in the period that ended is the time for which they were open times the mean of
+the flows at its beginning and end, see `flow`. Height follows from air by the gas law: V = A/(p0 + P) - V_line. No membrane is
+in it. What is known of the membrane corrects the air now and then, see `reference`.
 
-A bubble where nothing is under way is *quiescent*: its limits are looked at in every tick, but it is measured and decided
-upon in every fourth only, by the mean of four readings (decimation). Whatever asks something else of a bubble ends that.
-A bubble whose valve stays open for three more periods *holds its output* through every second tick. `DUE` says for the
-passes that follow whether a bubble is decided upon in this tick.
+A *quiescent* bubble has its limits looked at in every tick, but it is measured and decided upon only when the mean of eight
+readings of its quiet line is there. Whatever asks something else of a bubble ends that. `DUE` says for the passes that
+follow whether a bubble is decided upon in this tick.
 """
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
@@ -17,36 +16,42 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 # [constants] bubble_protocol.schema.faults: used
 # [constants] bubble_firmware.hal.base: ABSENT
 _SENSOR_ZERO = const(0)
-_PRESSURE = const(4)
-_SUSPECT = const(5)
-_QUIESCENT = const(6)
-_DECIMATION_LEFT = const(7)
-_DECIMATION_SUM = const(8)
-_SETTLING_US = const(9)
-_AIR = const(10)
-_AIR_IN_FLIGHT = const(11)
-_AIR_QUEUED = const(12)
-_SAMPLES = const(13)
+_FILL_OPENS_US = const(1)
+_FILL_CLOSES_US = const(2)
+_FILL_GAIN = const(3)
+_PRESSURE = const(7)
+_SUSPECT = const(8)
+_QUIESCENT = const(9)
+_READINGS = const(10)
+_READINGS_SUM = const(11)
+_SETTLING_US = const(12)
+_AIR = const(13)
+_AIR_METERED = const(14)
+_AIR_IN_FLIGHT = const(15)
+_FILL_FLOW = const(16)
+_VENT_FLOW = const(17)
 _FILL_US = const(18)
-_FILL_RUN_US = const(20)
-_FAULTS = const(21)
-_STATUS = const(22)
-_HEIGHT = const(24)
-_HEIGHT_SEGMENT = const(25)
-_HEIGHT_SLOPE = const(26)
-_DUE = const(27)
-_HOLD_OUTPUT = const(34)
-_FIRST_SEGMENT = const(35)
-_LAST_SEGMENT = const(36)
-_LOWEST_PRESSURE = const(37)
-_HIGHEST_PRESSURE = const(38)
-_OVERPRESSURE_TICKS = const(39)
-_LOST_TICKS = const(40)
-_ROW_WORDS = const(41)
+_FILL_OPEN_US = const(20)
+_FILL_FULL = const(22)
+_VENT_FULL = const(23)
+_DUE = const(24)
+_FAULTS = const(26)
+_HEIGHT = const(28)
+_HEIGHT_SEGMENT = const(29)
+_FIRST_SEGMENT = const(41)
+_LAST_SEGMENT = const(42)
+_OVERPRESSURE_TICKS = const(43)
+_LOST_TICKS = const(44)
+_EMPTY_TICKS = const(45)
+_AIR_SD = const(46)
+_CORRELATION = const(49)
+_HEIGHT_SD = const(50)
+_PEAK = const(55)
+_FLOW_SD = const(56)
+_QUIET_PRESSURE = const(58)
+_ROW_WORDS = const(59)
 _KNOT_HEIGHT = const(0)
-_KNOT_AIR = const(1)
-_KNOT_PRESSURE = const(2)
-_KNOT_SLOPE = const(3)
+_KNOT_VOLUME = const(1)
 _KNOT_RECIPROCAL = const(4)
 _KNOT_WORDS = const(5)
 _BUBBLE_COUNT = const(0)
@@ -55,31 +60,44 @@ _PA_PER_COUNT = const(2)
 _COUNT_LOW = const(3)
 _COUNT_HIGH = const(4)
 _PRESSURE_MAX = const(5)
-_CONTROL_MODE = const(16)
-_ROWS = const(150)
+_TUBE_PA = const(9)
+_CONTROL_MODE = const(15)
+_TICK = const(19)
+_ROOTS = const(24)
+_ROOT_STEPS = const(64)
+_ROWS = const(154)
+_ATMOSPHERE = const(101325)
 _READINGS_MIN = const(2)
-_SAMPLES_MAX = const(64)
-_INNOVATION_UM = const(500)
-_INNOVATION_PA = const(500)
+_READINGS_MEAN = const(8)
+_ROOT_END = const(8191)
 _OVERPRESSURE = const(1)
 _SENSOR_LOST = const(2)
 _ABSENT = const(65535)
 # [end of constants]
 
 _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps every product of control within 32 bits
+_EMPTY_PA = const(300)  # a line that has no more for a while is empty: the best reference there is
+_EMPTY_US = const(100000)
+_AIR_SD_EMPTY = const(200)  # µJ
+_AIR_SD_MAX = const(60000)
 
 
 @micropython.viper
-def estimate(row: ptr32, board: ptr32, counts: ptr16, mode: int):
+def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) -> int:
     """Take up this tick's `counts`: pressures, faults of the sensors, and air and height of every bubble that is due.
 
-    `mode` is what control is to do, see `state_layout`: where it has changed, every bubble is due.
+    `supply` is the reservoir's pressure in Pa. `mode` is what control is to do, see `state_layout`: where it has changed, every
+    bubble is due. Returns the number, from 1, of the bubble whose mean of a quiet line is to be compared with its curve; 0: none.
     """
     n = board[_BUBBLE_COUNT]
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
     tick = board[_TICK_US]
     same = 1 if mode == board[_CONTROL_MODE] else 0
     board[_CONTROL_MODE] = mode
+    board[_TICK] = board[_TICK] + 1
+    supply_scale = supply + _ATMOSPHERE >> 3  # 8 Pa
+    supply_reciprocal = 0x3FFFFFFF // (supply + _ATMOSPHERE)
+    chosen = 0
     i = 0
     while i < n:
         count = counts[i]
@@ -91,8 +109,6 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, mode: int):
         ) >> 31 | row[_SUSPECT]:
             row[_SUSPECT] = 0
             row[_QUIESCENT] = 0
-            row[_HOLD_OUTPUT] = 0
-            row[_DECIMATION_LEFT] = -1
             if count <= board[_COUNT_LOW] or count >= board[_COUNT_HIGH]:
                 row[_SUSPECT] = 1
                 # A chip that has not answered is no noise: that one reading is enough.
@@ -117,94 +133,117 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, mode: int):
             if row[_SETTLING_US] > 0:
                 row[_SETTLING_US] = row[_SETTLING_US] - tick
                 due = 0
-            elif row[_DECIMATION_LEFT] > 0:
-                row[_DECIMATION_LEFT] = row[_DECIMATION_LEFT] - 1
-                row[_DECIMATION_SUM] = row[_DECIMATION_SUM] + pressure
+            elif row[_READINGS] < _READINGS_MEAN:
+                row[_READINGS] = row[_READINGS] + 1
+                row[_READINGS_SUM] = row[_READINGS_SUM] + pressure
                 due = 0
-        elif row[_HOLD_OUTPUT] & same:
-            row[_HOLD_OUTPUT] = 0
-            row[_AIR] = row[_AIR] + row[_AIR_IN_FLIGHT]
-            row[_AIR_IN_FLIGHT] = row[_AIR_QUEUED]
-            row[_FILL_RUN_US] = row[_FILL_RUN_US] + row[_FILL_US]
-            due = 0
+            elif chosen:
+                due = 0  # one in a tick
+            else:
+                if row[_VENT_FULL] == 0:
+                    chosen = i + 1
+                pressure = row[_READINGS_SUM] >> 3
+                row[_QUIET_PRESSURE] = pressure
+                row[_READINGS] = 0
+                row[_READINGS_SUM] = 0
+        else:
+            row[_READINGS] = 0
+            row[_READINGS_SUM] = 0
         row[_DUE] = due
 
         if due:
-            air = row[_AIR] + row[_AIR_IN_FLIGHT]
-            segment = row[_HEIGHT_SEGMENT]
-            knot = ptr32(uint(curves) + segment)
-            if row[_SETTLING_US] <= 0 and row[_SUSPECT] == 0:
-                # The air that this pressure means: in the segment that contains it and is nearest to the
-                # estimate's, because a bubble stays on the branch where it was.
-                mean = pressure
-                weight = 1
-                if row[_DECIMATION_LEFT] == 0:
-                    mean = row[_DECIMATION_SUM] + pressure >> 2
-                    weight = 4
-                row[_DECIMATION_LEFT] = -1
-                if (mean - row[_LOWEST_PRESSURE] | row[_HIGHEST_PRESSURE] - mean) >> 31:
-                    if mean < row[_LOWEST_PRESSURE]:
-                        knot = ptr32(uint(curves) + row[_FIRST_SEGMENT])
-                        innovation = knot[_KNOT_AIR] - air
-                    else:
-                        knot = ptr32(uint(curves) + row[_LAST_SEGMENT])
-                        innovation = knot[_KNOT_WORDS + _KNOT_AIR] - air
+            # Air: what each valve has brought in the period that ended, and what it brings in the one that begins.
+            metered = 0
+            in_flight = 0
+            valve = 0
+            while valve < 2:
+                trim = ptr32(uint(row) + 12 * valve)  # of this valve
+                state = ptr32(uint(row) + 4 * valve)
+                before = state[_FILL_FLOW]
+                was_open = state[_FILL_FULL]
+                at = row[_PRESSURE]
+                if valve == 0:
+                    if was_open == 0:
+                        at += board[_TUBE_PA] * before >> 4  # which the tube will lose once air flows
+                    at = (supply - at) * supply_reciprocal >> 16
+                    scale = supply_scale
                 else:
-                    low = segment
-                    high = segment
-                    upwards = 1
-                    while (mean - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - mean) >> 31:
-                        if upwards:
-                            upwards = 0
-                            if high != row[_LAST_SEGMENT]:
-                                high += 4 * _KNOT_WORDS
-                            knot = ptr32(uint(curves) + high)
-                        else:
-                            upwards = 1
-                            if low != row[_FIRST_SEGMENT]:
-                                low -= 4 * _KNOT_WORDS
-                            knot = ptr32(uint(curves) + low)
-                    innovation = knot[_KNOT_AIR] - air
-                    rise = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
-                    if rise:
-                        part = (mean - knot[_KNOT_PRESSURE] << 12) // rise
-                        innovation += part * (knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]) >> 12
-                knot = ptr32(uint(curves) + segment)
-                if row[_STATUS] & 3:
-                    samples = row[_SAMPLES] + weight
-                    if samples > _SAMPLES_MAX:
-                        samples = _SAMPLES_MAX
-                    # Innovation gate: the pressure that the estimate means, within its segment of the tick before.
-                    rise = knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]
-                    part = air - knot[_KNOT_AIR]
-                    if part < 0:
-                        part = 0
-                    if part > rise:
-                        part = rise
-                    part = (part << 12) // rise
-                    off = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
-                    off = mean - knot[_KNOT_PRESSURE] - (part * off >> 12)
-                    far = row[_HEIGHT_SLOPE] * _INNOVATION_UM >> 8
-                    if (far - innovation | far + innovation) >> 31 and (
-                        off > _INNOVATION_PA or off < 0 - _INNOVATION_PA
-                    ):
-                        samples = 1
-                        weight = 1
-                    row[_SAMPLES] = samples
-                    air += (
-                        innovation * weight + (samples >> 1)
-                    ) // samples  # rounded: a bias would add up over so many
-                else:  # the vent is open: nothing is counted, the sensor alone says what there is
-                    air += innovation
-                if air < 0:
-                    air = 0
+                    if was_open == 0:
+                        at -= board[_TUBE_PA] * before >> 4
+                    at >>= 3
+                    scale = 1 << 14
+                if at >> 13:
+                    at = _ROOT_END if at > 0 else 0
+                part = at & 127
+                at >>= 7
+                if valve:
+                    at += _ROOT_STEPS + 1
+                roots = ptr32(uint(board) + 4 * at)
+                root = scale * (roots[_ROOTS] + ((roots[_ROOTS + 1] - roots[_ROOTS]) * part >> 7)) >> 14
+                flow = (root * trim[_FILL_GAIN] >> 12) + 1
+                state[_FILL_FLOW] = flow
+                energised = state[_FILL_US]
+                open_us = state[_FILL_OPEN_US]
+                if open_us | energised | was_open:
+                    moved = ((before + flow) * open_us >> 13) * 16777 >> 16
+                    open_us = 0
+                    if energised:
+                        open_us = energised if was_open else energised - trim[_FILL_OPENS_US]
+                    if energised < tick and energised | was_open:
+                        open_us += trim[_FILL_CLOSES_US]
+                    if open_us < 0:
+                        open_us = 0
+                    state[_FILL_OPEN_US] = open_us
+                    state[_FILL_FULL] = 1 if energised == tick else 0
+                    coming = (flow * open_us >> 12) * 16777 >> 16
+                    if valve:
+                        moved = 0 - moved
+                        coming = 0 - coming
+                    metered += moved
+                    in_flight += coming
+                    if moved:
+                        if moved < 0:
+                            moved = 0 - moved
+                        row[_AIR_SD] = row[_AIR_SD] + (moved * row[_FLOW_SD] >> 16) + (20 if energised == 0 else 0)
+                valve += 1
+            row[_AIR_METERED] = metered
+            row[_AIR_IN_FLIGHT] = in_flight
+            air = row[_AIR] + metered
+            segment = row[_HEIGHT_SEGMENT]
+
+            # Without pressure it is empty.
+            if pressure < _EMPTY_PA:
+                if row[_EMPTY_TICKS] * tick < _EMPTY_US:
+                    row[_EMPTY_TICKS] = row[_EMPTY_TICKS] + 1
+                else:
+                    segment = row[_FIRST_SEGMENT]
+                    knot = ptr32(uint(curves) + segment)
+                    air = (pressure + _ATMOSPHERE >> 4) * knot[_KNOT_VOLUME] // 4000
+                    row[_AIR_SD] = _AIR_SD_EMPTY
+                    row[_CORRELATION] = 0
+            else:
+                row[_EMPTY_TICKS] = 0
+            if air < 0:
+                air = 0
             if air > _AIR_MAX:
                 air = _AIR_MAX
             row[_AIR] = air
+            if row[_AIR_SD] > _AIR_SD_MAX:
+                row[_AIR_SD] = _AIR_SD_MAX
 
-            # The height that this air means.
-            off = air - knot[_KNOT_AIR]
-            while (off | knot[_KNOT_WORDS + _KNOT_AIR] - air) >> 31:  # it is in another segment
+            # Height: by the gas law. What the open valve's tube loses is not in the bubble.
+            if row[_FILL_FULL] | row[_VENT_FULL] and chosen != i + 1:
+                if row[_FILL_FULL]:
+                    pressure -= board[_TUBE_PA] * row[_FILL_FLOW] >> 4
+                else:
+                    pressure += board[_TUBE_PA] * row[_VENT_FLOW] >> 4
+            absolute = (pressure + _ATMOSPHERE) * 8389 >> 17
+            if absolute < 5000:
+                absolute = 5000
+            volume = (air << 12) // absolute
+            knot = ptr32(uint(curves) + segment)
+            off = volume - knot[_KNOT_VOLUME]
+            while (off | knot[_KNOT_WORDS + _KNOT_VOLUME] - volume) >> 31:  # it is in another segment
                 if off < 0:
                     if segment == row[_FIRST_SEGMENT]:
                         off = 0
@@ -212,13 +251,17 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, mode: int):
                     segment -= 4 * _KNOT_WORDS
                 else:
                     if segment == row[_LAST_SEGMENT]:
-                        off = knot[_KNOT_WORDS + _KNOT_AIR] - knot[_KNOT_AIR]
+                        off = knot[_KNOT_WORDS + _KNOT_VOLUME] - knot[_KNOT_VOLUME]
                         break
                     segment += 4 * _KNOT_WORDS
                 knot = ptr32(uint(curves) + segment)
-                off = air - knot[_KNOT_AIR]
-            row[_HEIGHT] = knot[_KNOT_HEIGHT] + (off * knot[_KNOT_RECIPROCAL] >> 16)
+                off = volume - knot[_KNOT_VOLUME]
+            height = knot[_KNOT_HEIGHT] + (off * knot[_KNOT_RECIPROCAL] >> 16)
+            row[_HEIGHT] = height
             row[_HEIGHT_SEGMENT] = segment
-            row[_HEIGHT_SLOPE] = knot[_KNOT_SLOPE]
+            if height > row[_PEAK]:
+                row[_PEAK] = height
+            row[_HEIGHT_SD] = (((row[_AIR_SD] << 12) // absolute >> 4) * (knot[_KNOT_RECIPROCAL] >> 8) >> 8) + 15
         i += 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
+    return chosen

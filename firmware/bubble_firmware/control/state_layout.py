@@ -9,55 +9,74 @@ Air is in µJ: 1 µJ = 1 kPa mm³ of pV content in bubble and line, isothermal.
 
 from bubble_protocol.mpy_compat import const
 
-# A bubble's row. The first four are its trim, in the order of `trim`.
+# A bubble's row. The first seven are its trim, in the order of `trim`; the three of the vent valve follow those of the fill valve.
 SENSOR_ZERO = const(0)  # counts at no pressure
-OPENS_US = const(1)  # valve dead times
-CLOSES_US = const(2)
-FLOW_GAIN = const(3)  # root of pressures (8 Pa) to flow (µJ/ms), /65536
-PRESSURE = const(4)  # measured, Pa gauge
-SUSPECT = const(5)  # whether the last reading was one that may become a fault
-QUIESCENT = const(6)  # whether nothing is under way
-DECIMATION_LEFT = const(7)  # readings yet to be summed before the mean is taken; -1: there is no sum
-DECIMATION_SUM = const(8)  # of pressures, Pa
-SETTLING_US = const(9)  # from the start of the period until the line is quiet
-AIR = const(10)  # at the start of this period, µJ
-AIR_IN_FLIGHT = const(11)  # what the period now playing brings, µJ
-AIR_QUEUED = const(12)  # what the period after it will bring, µJ
-SAMPLES = const(13)  # how many readings the estimate averages; 0: none yet
-FLOW = const(14)  # at the last dose, µJ/ms, *16, filling or venting
-INTEGRAL = const(15)  # of the error, µJ ticks
-ERROR = const(16)  # last tick's, µJ
-PREVIOUS_SETPOINT_AIR = const(17)  # last tick's, µJ
+FILL_OPENS_US = const(1)  # valve dead times
+FILL_CLOSES_US = const(2)
+FILL_GAIN = const(3)  # root of pressures (8 Pa) to flow (µJ/ms), /65536
+VENT_OPENS_US = const(4)
+VENT_CLOSES_US = const(5)
+VENT_GAIN = const(6)
+PRESSURE = const(7)  # measured, Pa gauge
+SUSPECT = const(8)  # whether the last reading was one that may become a fault
+QUIESCENT = const(9)  # whether nothing is under way
+READINGS = const(10)  # of a quiet line, in the sum
+READINGS_SUM = const(11)  # Pa
+SETTLING_US = const(12)  # from the start of the period until the line is quiet
+AIR = const(13)  # at the start of this period, µJ
+AIR_METERED = const(14)  # what the valves have brought in the period that ended, µJ
+AIR_IN_FLIGHT = const(15)  # what the period now playing brings, µJ
+FILL_FLOW = const(16)  # at this moment's pressures, were the valve open, µJ/ms, *16
+VENT_FLOW = const(17)
 FILL_US = const(18)  # energised in the period now playing
 VENT_US = const(19)
-FILL_RUN_US = const(20)  # how long the fill valve has been open at a stretch
-FAULTS = const(21)
-STATUS = const(22)
-TARGET = const(23)  # asked, µm
-HEIGHT = const(24)  # the estimate, in 1/16 µm, so that averages do not stall on whole ones
-HEIGHT_SEGMENT = const(25)  # where its segment of the curve begins, bytes
-HEIGHT_SLOPE = const(26)  # air per height in that segment, µJ/µm, *256
-DUE = const(27)  # whether it is measured and decided upon in this tick
-SETPOINT = const(28)  # in 1/16 µm
-SETPOINT_SEGMENT = const(29)
-SETPOINT_SLOPE = const(30)
+FILL_OPEN_US = const(20)  # how long the valve is open in the period now playing
+VENT_OPEN_US = const(21)
+FILL_FULL = const(22)  # whether it is still open when that ends
+VENT_FULL = const(23)
+DUE = const(24)  # whether it is measured and decided upon in this tick
+STATUS = const(25)
+FAULTS = const(26)
+TARGET = const(27)  # asked, µm
+HEIGHT = const(28)  # the estimate, in 1/16 µm
+HEIGHT_SEGMENT = const(29)  # where its segment of the curve begins, bytes
+SETPOINT = const(30)  # in 1/16 µm
 SETPOINT_AIR = const(31)  # µJ
-RAMP_START = const(32)  # where the ramp to the target began, µm
-RAMPING = const(33)  # whether the setpoint is not at its target yet
-HOLD_OUTPUT = const(34)  # whether the next tick goes on as this one
-FIRST_SEGMENT = const(35)  # of its curve, bytes
-LAST_SEGMENT = const(36)
-LOWEST_PRESSURE = const(37)  # of its curve, Pa
-HIGHEST_PRESSURE = const(38)
-OVERPRESSURE_TICKS = const(39)  # in a row above the pressure limit
-LOST_TICKS = const(40)  # in a row with the sensor at an end of its range
-ROW_WORDS = const(41)
+PREVIOUS_SETPOINT_AIR = const(32)  # last tick's, µJ
+SETPOINT_SEGMENT = const(33)
+SETPOINT_VOLUME = const(34)  # of bubble and line, 1/64 mm³
+SETPOINT_PRESSURE = const(35)  # by the curve, Pa
+SETPOINT_SLOPE = const(36)  # volume per height there, 1/64 mm³/µm, *256
+RAMP_START = const(37)  # where the ramp to the target began, µm
+RAMPING = const(38)  # whether the setpoint is not at its target yet
+FILL_RUN_US = const(39)  # how long the fill valve has been open at a stretch
+ERROR = const(40)  # last tick's, µJ
+FIRST_SEGMENT = const(41)  # of its curve, bytes
+LAST_SEGMENT = const(42)
+OVERPRESSURE_TICKS = const(43)  # in a row above the pressure limit
+LOST_TICKS = const(44)  # in a row with the sensor at an end of its range
+EMPTY_TICKS = const(45)  # in a row without pressure
+# What is known, and how well: see `reference`.
+AIR_SD = const(46)  # of the air, µJ
+CURVE_ERROR = const(47)  # share by which the pressure is above the curve's, *65536
+CURVE_ERROR_SD = const(48)  # *65536
+CORRELATION = const(49)  # of the two errors, *4096
+HEIGHT_SD = const(50)  # µm
+PRESSURE_RATIO = const(51)  # share by which the quiet line's pressure is above the curve's, averaged, *4096
+DWELL_HEIGHT = const(52)  # where the bubble stood when the curve was first asked in this dwell, µm
+DWELL_SLOPE = const(53)  # pressure per height there, Pa/µm, *1024; 0: not yet known
+REFERENCE_TICK = const(54)  # when it was last asked
+PEAK = const(55)  # greatest height lately, 1/16 µm
+FLOW_SD = const(56)  # of the flow gains, share *65536
+CURVE_SD = const(57)  # of the curve and of the rubber's memory, share *65536
+QUIET_PRESSURE = const(58)  # mean of the last readings of a quiet line, Pa
+ROW_WORDS = const(59)
 
 # A knot of a curve, see `curve`.
 KNOT_HEIGHT = const(0)  # 1/16 µm
-KNOT_AIR = const(1)  # µJ
+KNOT_VOLUME = const(1)  # of bubble and line, 1/64 mm³
 KNOT_PRESSURE = const(2)  # Pa
-KNOT_SLOPE = const(3)  # air per height from here on, µJ/µm, *256
+KNOT_SLOPE = const(3)  # volume per height from here on, 1/64 mm³/µm, *256
 KNOT_RECIPROCAL = const(4)  # of the slope, 2^28/slope
 KNOT_WORDS = const(5)
 
@@ -73,33 +92,32 @@ PULSE_MIN_US = const(7)
 QUIET_US = const(8)  # from the closing of a valve until the line is quiet
 TUBE_PA = const(9)  # pressure lost along the tube, Pa per µJ/ms
 GAIN_P = const(10)  # gains *256
-GAIN_I = const(11)
-GAIN_D = const(12)
-DEADBAND_UM = const(13)
-SETTLED_UM = const(14)
-REST_UM = const(15)
-CONTROL_MODE = const(16)  # of the last tick
-RAMP_DONE = const(17)  # ticks
-RAMP_TICKS = const(18)
-RAMP_SHARE = const(19)  # how much of it is done, *4096
-BOARD_WORDS = const(20)
+GAIN_D = const(11)
+DEADBAND_UM = const(12)
+SETTLED_UM = const(13)
+REST_UM = const(14)
+CONTROL_MODE = const(15)  # of the last tick
+RAMP_DONE = const(16)  # ticks
+RAMP_TICKS = const(17)
+RAMP_SHARE = const(18)  # how much of it is done, *4096
+TICK = const(19)  # number of this one
+SUPPLY_SCALE = const(20)  # absolute pressure of the supply, 8 Pa
+SUPPLY_RECIPROCAL = const(21)
+SECOND = const(22)  # ticks
+BOARD_WORDS = const(24)
 
 # The tables of roots, see `flow`; then the rows; after them the curves.
-ROOTS = const(20)
+ROOTS = const(24)
 ROOT_STEPS = const(64)  # in each of the two tables
-ROWS = const(150)
+ROWS = const(154)
 
 ATMOSPHERE = const(101325)  # Pa
 READINGS_MIN = const(2)  # in a row that make a fault: one alone is noise
 
 # The law's own numbers, the same for all boards.
-SAMPLES_MAX = const(64)
-SAMPLES_DOSED = const(16)  # left after a short dose, which is metered well
-INNOVATION_UM = const(500)  # further off than metering ever is,
-INNOVATION_PA = const(500)  # by more than noise: believe the sensor afresh
-DECIMATION = const(3)  # readings of a quiescent bubble that are summed before the one that makes the mean
-INTEGRAL_MAX = const(1 << 17)  # µJ ticks
+READINGS_MEAN = const(8)  # of a quiet line, which make a mean
 DOSE_MAX = const(50000)  # µJ, more than any period brings
+ROOT_END = const(8191)  # the last place in a table of roots, *128
 
 # What control is to do with all bubbles: open the vents, follow the setpoints, keep all valves closed.
 VENT = const(0)

@@ -6,70 +6,82 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 # [constants] bubble_firmware.control.state_layout: used
 # [constants] bubble_protocol.schema.statuses: used
 # [constants] bubble_protocol.steps: used
-_QUIESCENT = const(6)
-_SAMPLES = const(13)
-_FAULTS = const(21)
-_STATUS = const(22)
-_TARGET = const(23)
-_HEIGHT = const(24)
-_DUE = const(27)
-_SETPOINT = const(28)
-_SETPOINT_SEGMENT = const(29)
-_SETPOINT_SLOPE = const(30)
+_QUIESCENT = const(9)
+_DUE = const(24)
+_FAULTS = const(26)
+_TARGET = const(27)
+_HEIGHT = const(28)
+_SETPOINT = const(30)
 _SETPOINT_AIR = const(31)
-_RAMP_START = const(32)
-_RAMPING = const(33)
-_HOLD_OUTPUT = const(34)
-_FIRST_SEGMENT = const(35)
-_LAST_SEGMENT = const(36)
-_ROW_WORDS = const(41)
+_SETPOINT_SEGMENT = const(33)
+_SETPOINT_VOLUME = const(34)
+_SETPOINT_PRESSURE = const(35)
+_SETPOINT_SLOPE = const(36)
+_RAMP_START = const(37)
+_RAMPING = const(38)
+_FIRST_SEGMENT = const(41)
+_LAST_SEGMENT = const(42)
+_PRESSURE_RATIO = const(51)
+_ROW_WORDS = const(59)
 _KNOT_HEIGHT = const(0)
-_KNOT_AIR = const(1)
+_KNOT_VOLUME = const(1)
+_KNOT_PRESSURE = const(2)
 _KNOT_SLOPE = const(3)
 _KNOT_WORDS = const(5)
 _BUBBLE_COUNT = const(0)
-_RAMP_DONE = const(17)
-_RAMP_TICKS = const(18)
-_RAMP_SHARE = const(19)
-_ROWS = const(150)
-_RESTING = const(0)
+_RAMP_DONE = const(16)
+_RAMP_TICKS = const(17)
+_RAMP_SHARE = const(18)
+_ROWS = const(154)
+_ATMOSPHERE = const(101325)
 _LEAVE = const(65535)
 # [end of constants]
 
 
 @micropython.viper
 def move_setpoints(row: ptr32, board: ptr32):
-    """Move the ramp on by a tick, and find height and air of the setpoint of every bubble that ramps and is due."""
+    """Move the ramp on by a tick, and find height and air of the setpoint of every bubble that is due.
+
+    Its pressure is expected to be above the curve's by the share by which the pressure of its quiet line was lately.
+    """
     if board[_RAMP_DONE] != board[_RAMP_TICKS]:
         board[_RAMP_DONE] = board[_RAMP_DONE] + 1
         board[_RAMP_SHARE] = (board[_RAMP_DONE] << 12) // board[_RAMP_TICKS]
     n = board[_BUBBLE_COUNT]
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
     while n > 0:
-        if row[_DUE] & row[_RAMPING]:
-            if board[_RAMP_DONE] == board[_RAMP_TICKS]:
-                row[_RAMPING] = 0
-            height = (row[_RAMP_START] << 4) + ((row[_TARGET] - row[_RAMP_START]) * board[_RAMP_SHARE] >> 8)
-            row[_SETPOINT] = height
-            segment = row[_SETPOINT_SEGMENT]
-            knot = ptr32(uint(curves) + segment)
-            off = height - knot[_KNOT_HEIGHT]
-            while (off | knot[_KNOT_WORDS + _KNOT_HEIGHT] - height) >> 31:  # it is in another segment
-                if off < 0:
-                    if segment == row[_FIRST_SEGMENT]:
-                        off = 0
-                        break
-                    segment -= 4 * _KNOT_WORDS
-                else:
-                    if segment == row[_LAST_SEGMENT]:
-                        off = knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]
-                        break
-                    segment += 4 * _KNOT_WORDS
+        if row[_DUE]:
+            if row[_RAMPING]:
+                if board[_RAMP_DONE] == board[_RAMP_TICKS]:
+                    row[_RAMPING] = 0
+                height = (row[_RAMP_START] << 4) + ((row[_TARGET] - row[_RAMP_START]) * board[_RAMP_SHARE] >> 8)
+                row[_SETPOINT] = height
+                segment = row[_SETPOINT_SEGMENT]
                 knot = ptr32(uint(curves) + segment)
                 off = height - knot[_KNOT_HEIGHT]
-            row[_SETPOINT_SEGMENT] = segment
-            row[_SETPOINT_SLOPE] = knot[_KNOT_SLOPE]
-            row[_SETPOINT_AIR] = knot[_KNOT_AIR] + (off * knot[_KNOT_SLOPE] >> 12)
+                while (off | knot[_KNOT_WORDS + _KNOT_HEIGHT] - height) >> 31:  # it is in another segment
+                    if off < 0:
+                        if segment == row[_FIRST_SEGMENT]:
+                            off = 0
+                            break
+                        segment -= 4 * _KNOT_WORDS
+                    else:
+                        if segment == row[_LAST_SEGMENT]:
+                            off = knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]
+                            break
+                        segment += 4 * _KNOT_WORDS
+                    knot = ptr32(uint(curves) + segment)
+                    off = height - knot[_KNOT_HEIGHT]
+                row[_SETPOINT_SEGMENT] = segment
+                row[_SETPOINT_SLOPE] = knot[_KNOT_SLOPE]
+                row[_SETPOINT_VOLUME] = knot[_KNOT_VOLUME] + (off * knot[_KNOT_SLOPE] >> 12)
+                rise = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
+                run = knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]
+                row[_SETPOINT_PRESSURE] = knot[_KNOT_PRESSURE] + off * rise // run
+            expected = row[_SETPOINT_PRESSURE] * (4096 + row[_PRESSURE_RATIO]) >> 12
+            if expected > 60000:
+                expected = 60000
+            row[_SETPOINT_AIR] = (expected + _ATMOSPHERE >> 4) * row[_SETPOINT_VOLUME] // 4000
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         n -= 1
 
@@ -81,7 +93,6 @@ def set_targets(row: ptr32, heights: ptr32, at: int, n: int):
         row[_RAMP_START] = row[_HEIGHT] >> 4
         row[_TARGET] = heights[at]
         row[_QUIESCENT] = 0
-        row[_HOLD_OUTPUT] = 0
         row[_RAMPING] = 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         at += 1
@@ -100,7 +111,6 @@ def set_next_targets(row: ptr32, heights: ptr16, at: int, n: int, from_height: i
         if target != _LEAVE:
             row[_TARGET] = target if target > rest_um else rest_um  # lower would be the end of the ramp before its time
         row[_QUIESCENT] = 0
-        row[_HOLD_OUTPUT] = 0
         row[_RAMPING] = 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         at += 1
@@ -114,7 +124,6 @@ def hold_position(row: ptr32, n: int):
         row[_RAMP_START] = row[_HEIGHT] >> 4
         row[_TARGET] = row[_RAMP_START]
         row[_QUIESCENT] = 0
-        row[_HOLD_OUTPUT] = 0
         row[_RAMPING] = 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         n -= 1
@@ -127,7 +136,6 @@ def retract(row: ptr32, height: int, n: int):
         row[_RAMP_START] = height
         row[_TARGET] = height
         row[_QUIESCENT] = 0
-        row[_HOLD_OUTPUT] = 0
         row[_RAMPING] = 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         n -= 1
@@ -135,14 +143,13 @@ def retract(row: ptr32, height: int, n: int):
 
 @micropython.viper
 def unsettled(row: ptr32, n: int, tolerance: int, rest_um: int) -> int:
-    """The bubbles, as bits, whose height is further than `tolerance` µm from the target, or not yet measured."""
+    """The bubbles, as bits, whose height is further than `tolerance` µm from the target."""
     bits = 0
     bit = 1
     while n > 0:
         target = row[_TARGET]
         off = (target if target > rest_um else rest_um) - (row[_HEIGHT] >> 4)
-        known = 1 if row[_SAMPLES] > 1 or row[_STATUS] == _RESTING else 0
-        if off > tolerance or off < 0 - tolerance or known == 0 or row[_FAULTS]:
+        if off > tolerance or off < 0 - tolerance or row[_FAULTS]:
             bits |= bit
         bit <<= 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)

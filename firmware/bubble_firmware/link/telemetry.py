@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 # [constants] bubble_protocol.schema.messages: TELEMETRY TELEMETRY_FIELDS
 # [constants] message TELEMETRY as TELEMETRY: TICKS MODE HEIGHT_UM
 # [constants] message TELEMETRY_FIELDS as FIELDS: *
-_PRESSURE = const(4)
+_PRESSURE = const(7)
 _FILL_US = const(18)
 _VENT_US = const(19)
-_FAULTS = const(21)
-_STATUS = const(22)
-_TARGET = const(23)
-_HEIGHT = const(24)
-_SETPOINT = const(28)
+_STATUS = const(25)
+_FAULTS = const(26)
+_TARGET = const(27)
+_HEIGHT = const(28)
+_SETPOINT = const(30)
 _TELEMETRY = const(7)
 _TELEMETRY_FIELDS = const(28)
 _TELEMETRY_TICKS = const(0)

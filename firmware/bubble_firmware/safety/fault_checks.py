@@ -21,28 +21,27 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 # [constants] bubble_firmware.safety.watch_layout: used
 # [constants] bubble_protocol.schema.statuses: used
 # [constants] bubble_protocol.schema.faults: LEAK NO_AIR VALVE_STUCK SENSOR_STUCK BUDGET
-_OPENS_US = const(1)
-_CLOSES_US = const(2)
-_PRESSURE = const(4)
-_QUIESCENT = const(6)
-_SETTLING_US = const(9)
-_AIR = const(10)
-_AIR_IN_FLIGHT = const(11)
-_AIR_QUEUED = const(12)
-_FLOW = const(14)
-_INTEGRAL = const(15)
+_FILL_OPENS_US = const(1)
+_FILL_CLOSES_US = const(2)
+_PRESSURE = const(7)
+_QUIESCENT = const(9)
+_SETTLING_US = const(12)
+_AIR = const(13)
+_AIR_METERED = const(14)
+_AIR_IN_FLIGHT = const(15)
+_FILL_FLOW = const(16)
+_VENT_FLOW = const(17)
 _FILL_US = const(18)
 _VENT_US = const(19)
-_FAULTS = const(21)
-_STATUS = const(22)
-_HOLD_OUTPUT = const(34)
-_LOST_TICKS = const(40)
-_ROW_WORDS = const(41)
+_STATUS = const(25)
+_FAULTS = const(26)
+_LOST_TICKS = const(44)
+_ROW_WORDS = const(59)
 _BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _TUBE_PA = const(9)
-_RAMP_DONE = const(17)
-_RAMP_TICKS = const(18)
+_RAMP_DONE = const(16)
+_RAMP_TICKS = const(17)
 _READINGS_MIN = const(2)
 _NEW_FAULT = const(1)
 _MOVING_BUBBLE = const(2)
@@ -203,7 +202,7 @@ def check_air(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32):
     while n > 0:
         if watch[_PREVIOUS_STATUS] & 3 and row[_LOST_TICKS] == 0:
             faults = row[_FAULTS]
-            residual = row[_AIR] - watch[_PREVIOUS_AIR] - watch[_PREVIOUS_IN_FLIGHT]
+            residual = row[_AIR] - watch[_PREVIOUS_AIR] - row[_AIR_METERED]
             delivered = 0
             # Where nothing has come and nothing is counted, the balance stays as it is.
             if (
@@ -216,7 +215,7 @@ def check_air(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32):
                 # For sure: dead times differ, so a valve may be open for less than is known.
                 open_us = watch[_PREVIOUS_FILL_US]
                 if open_us and (open_us < tick or watch[_OPEN_TICKS] == 0):
-                    open_us -= row[_OPENS_US] - row[_CLOSES_US] + _UNSURE_US
+                    open_us -= row[_FILL_OPENS_US] - row[_FILL_CLOSES_US] + _UNSURE_US
                 delivered = watch[_PREVIOUS_FLOW] * open_us // 16000 if open_us > 0 else 0
 
                 # The deficit is at most what has come in for sure: the rest is bad metering.
@@ -327,8 +326,6 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
             row[_FAULTS] = faults
             row[_STATUS] = _FAULT
             row[_QUIESCENT] = 0  # control is to look at it in the next tick
-            row[_HOLD_OUTPUT] = 0
-            row[_AIR_QUEUED] = 0
             row[_FILL_US] = 0
             row[_VENT_US] = tick
             pulses[2 * i] = 0
@@ -347,7 +344,7 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                 watch[_CLOSED_TICKS] = _SETTLE_TICKS
         watch[_PREVIOUS_IN_FLIGHT] = row[_AIR_IN_FLIGHT]
         watch[_PREVIOUS_SETTLING_US] = row[_SETTLING_US]
-        watch[_PREVIOUS_FLOW] = row[_FLOW]
+        watch[_PREVIOUS_FLOW] = row[_FILL_FLOW] if row[_FILL_US] else row[_VENT_FLOW]
         watch[_PREVIOUS_FILL_US] = row[_FILL_US]
         watch[_PREVIOUS_VENT_US] = row[_VENT_US]
         watch[_LOGGED_FAULTS] = watch[_LOGGED_FAULTS] & faults
@@ -367,10 +364,7 @@ def block_backflow(row: ptr32, pulses: ptr16, supply: int, n: int):
         if pulses[2 * i] and supply < row[_PRESSURE]:
             pulses[2 * i] = 0
             row[_FILL_US] = 0
-            row[_AIR_QUEUED] = 0
-            row[_INTEGRAL] = 0
             row[_QUIESCENT] = 0
-            row[_HOLD_OUTPUT] = 0
         i += 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
 
@@ -381,8 +375,6 @@ def open_vents(row: ptr32, pulses: ptr16, tick: int, n: int):
     i = 0
     while i < n:
         row[_QUIESCENT] = 0
-        row[_HOLD_OUTPUT] = 0
-        row[_AIR_QUEUED] = 0
         row[_FILL_US] = 0
         row[_VENT_US] = tick
         pulses[2 * i] = 0
