@@ -204,7 +204,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                     if moved:
                         if moved < 0:
                             moved = 0 - moved
-                        row[_AIR_SD] = row[_AIR_SD] + (moved * row[_FLOW_SD] >> 16) + (20 if energised == 0 else 0)
+                        row[_AIR_SD] = row[_AIR_SD] + (moved * row[_FLOW_SD] >> 16) + (10 if energised == 0 else 0)
                 valve += 1
             row[_AIR_METERED] = metered
             row[_AIR_IN_FLIGHT] = in_flight

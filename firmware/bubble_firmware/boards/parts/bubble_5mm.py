@@ -39,5 +39,5 @@ QUIET_US = 7000  # after a valve has closed, until tube and membrane have settle
 GAIN_P = 230
 GAIN_I = 4
 GAIN_D = 16
-DEADBAND_UM = 60  # no dose for less
+DEADBAND_UM = 30  # no dose for less
 SETTLED_UM = 120  # a bubble this near its target counts as there
