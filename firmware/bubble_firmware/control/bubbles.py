@@ -179,7 +179,7 @@ class Bubbles:
             rows[at + _FILL_OPENS_US] = rows[at + _VENT_OPENS_US] = board.VALVE_OPENS_US
             rows[at + _FILL_CLOSES_US] = rows[at + _VENT_CLOSES_US] = board.VALVE_CLOSES_US
             rows[at + _FILL_GAIN] = rows[at + _VENT_GAIN] = flow.flow_gain(board)
-            rows[at + _FLOW_SD] = 197
+            rows[at + _FLOW_SD] = 230
             rows[at + _CURVE_SD] = rows[at + _CURVE_ERROR_SD] = 6554
             rows[at + _AIR_SD] = 200
             rows[at + _TARGET] = rows[at + _RAMP_START] = board.HEIGHT_REST_UM
