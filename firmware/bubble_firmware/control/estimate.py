@@ -35,6 +35,7 @@ _FILL_OPEN_US = const(20)
 _FILL_FULL = const(22)
 _VENT_FULL = const(23)
 _DUE = const(24)
+_STATUS = const(25)
 _FAULTS = const(26)
 _HEIGHT = const(28)
 _HEIGHT_SEGMENT = const(29)
@@ -44,14 +45,19 @@ _OVERPRESSURE_TICKS = const(43)
 _LOST_TICKS = const(44)
 _EMPTY_TICKS = const(45)
 _AIR_SD = const(46)
+_CURVE_ERROR = const(47)
+_CURVE_ERROR_SD = const(48)
 _CORRELATION = const(49)
 _HEIGHT_SD = const(50)
 _PEAK = const(55)
 _FLOW_SD = const(56)
+_CURVE_SD = const(57)
 _QUIET_PRESSURE = const(58)
-_ROW_WORDS = const(59)
+_FAR_TICKS = const(59)
+_ROW_WORDS = const(60)
 _KNOT_HEIGHT = const(0)
 _KNOT_VOLUME = const(1)
+_KNOT_PRESSURE = const(2)
 _KNOT_RECIPROCAL = const(4)
 _KNOT_WORDS = const(5)
 _BUBBLE_COUNT = const(0)
@@ -80,6 +86,9 @@ _EMPTY_PA = const(300)  # a line that has no more for a while is empty: the best
 _EMPTY_US = const(100000)
 _AIR_SD_EMPTY = const(200)  # µJ
 _AIR_SD_MAX = const(60000)
+_FAR_PA = const(10000)
+_FAR_MAX = const(3)  # ticks
+_AIR_SD_FAR = const(20000)
 
 
 @micropython.viper
@@ -232,12 +241,13 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 row[_AIR_SD] = _AIR_SD_MAX
 
             # Height: by the gas law. What the open valve's tube loses is not in the bubble.
+            absolute = pressure + _ATMOSPHERE
             if row[_FILL_FULL] | row[_VENT_FULL] and chosen != i + 1:
                 if row[_FILL_FULL]:
-                    pressure -= board[_TUBE_PA] * row[_FILL_FLOW] >> 4
+                    absolute -= board[_TUBE_PA] * row[_FILL_FLOW] >> 4
                 else:
-                    pressure += board[_TUBE_PA] * row[_VENT_FLOW] >> 4
-            absolute = (pressure + _ATMOSPHERE) * 8389 >> 17
+                    absolute += board[_TUBE_PA] * row[_VENT_FLOW] >> 4
+            absolute = absolute * 8389 >> 17
             if absolute < 5000:
                 absolute = 5000
             volume = (air << 12) // absolute
@@ -257,6 +267,48 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 knot = ptr32(uint(curves) + segment)
                 off = volume - knot[_KNOT_VOLUME]
             height = knot[_KNOT_HEIGHT] + (off * knot[_KNOT_RECIPROCAL] >> 16)
+
+            # A pressure that no memory explains: the air is not what was metered. It is what the curve says, there where it
+            # has this pressure next to the height so far, because a bubble stays on the branch where it was.
+            far = pressure - knot[_KNOT_PRESSURE] - (knot[_KNOT_PRESSURE] * (row[_CURVE_ERROR] >> 4) >> 12)
+            if (_FAR_PA - far | _FAR_PA + far) >> 31 == 0 or row[_SUSPECT]:
+                row[_FAR_TICKS] = 0
+            elif row[_STATUS] & 3 and row[_FAR_TICKS] < _FAR_MAX:
+                row[_FAR_TICKS] = row[_FAR_TICKS] + 1
+            else:
+                low = segment
+                high = segment
+                upwards = 1
+                while (pressure - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - pressure) >> 31:
+                    if high == row[_LAST_SEGMENT] and low == row[_FIRST_SEGMENT]:
+                        break
+                    if upwards and high != row[_LAST_SEGMENT] or low == row[_FIRST_SEGMENT]:
+                        upwards = 0
+                        high += 4 * _KNOT_WORDS
+                        segment = high
+                    else:
+                        upwards = 1
+                        low -= 4 * _KNOT_WORDS
+                        segment = low
+                    knot = ptr32(uint(curves) + segment)
+                off = pressure - knot[_KNOT_PRESSURE]
+                rise = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
+                if rise == 0:
+                    off = 0
+                    rise = 1
+                off = (off << 10) // rise  # share of the segment, *1024
+                if off < 0:
+                    off = 0
+                if off > 1024:
+                    off = 1024
+                height = knot[_KNOT_HEIGHT] + (off * (knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]) >> 10)
+                volume = knot[_KNOT_VOLUME] + (off * (knot[_KNOT_WORDS + _KNOT_VOLUME] - knot[_KNOT_VOLUME]) >> 10)
+                row[_AIR] = (pressure + _ATMOSPHERE >> 4) * volume // 4000
+                row[_AIR_SD] = _AIR_SD_FAR
+                row[_CORRELATION] = 0
+                row[_CURVE_ERROR] = 0
+                row[_CURVE_ERROR_SD] = row[_CURVE_SD]
+                row[_FAR_TICKS] = 0
             row[_HEIGHT] = height
             row[_HEIGHT_SEGMENT] = segment
             if height > row[_PEAK]:

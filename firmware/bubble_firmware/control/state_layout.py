@@ -9,7 +9,7 @@ Air is in µJ: 1 µJ = 1 kPa mm³ of pV content in bubble and line, isothermal.
 
 from bubble_protocol.mpy_compat import const
 
-# A bubble's row. The first seven are its trim, in the order of `trim`; the three of the vent valve follow those of the fill valve.
+# A bubble's row. The first seven are its trim, in the order of `trim`; those of the vent valve after those of the fill valve.
 SENSOR_ZERO = const(0)  # counts at no pressure
 FILL_OPENS_US = const(1)  # valve dead times
 FILL_CLOSES_US = const(2)
@@ -70,7 +70,8 @@ PEAK = const(55)  # greatest height lately, 1/16 µm
 FLOW_SD = const(56)  # of the flow gains, share *65536
 CURVE_SD = const(57)  # of the curve and of the rubber's memory, share *65536
 QUIET_PRESSURE = const(58)  # mean of the last readings of a quiet line, Pa
-ROW_WORDS = const(59)
+FAR_TICKS = const(59)  # in a row with a pressure that the metered air cannot have
+ROW_WORDS = const(60)
 
 # A knot of a curve, see `curve`.
 KNOT_HEIGHT = const(0)  # 1/16 µm
