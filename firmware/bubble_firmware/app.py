@@ -74,7 +74,7 @@ class App:
         self.fault_monitor = state.fault_monitor
         self.faults = state.faults
         self.faults.latch_board(hal.boot_faults)
-        self.settings = Settings(board, self.deadman, self.fault_monitor)
+        self.settings = Settings(board, self.deadman, self.fault_monitor, self.bubbles)
         content = Content(board, self.tables, self.bubbles, self.trim, self.settings)
         self.store = Store(board.NAME, hal.flash, content)
         self.player = Player(board, state, self.bubbles)

@@ -29,26 +29,27 @@ _FILL_GAIN = const(3)
 _VENT_OPENS_US = const(4)
 _VENT_CLOSES_US = const(5)
 _VENT_GAIN = const(6)
-_PRESSURE = const(7)
-_QUIESCENT = const(9)
-_AIR = const(13)
-_STATUS = const(25)
-_FAULTS = const(26)
-_TARGET = const(27)
-_HEIGHT = const(28)
-_HEIGHT_SEGMENT = const(29)
-_SETPOINT = const(30)
-_SETPOINT_SEGMENT = const(33)
-_RAMP_START = const(37)
-_RAMPING = const(38)
-_FIRST_SEGMENT = const(41)
-_LAST_SEGMENT = const(42)
-_AIR_SD = const(46)
-_CURVE_ERROR_SD = const(48)
-_DWELL_SLOPE = const(53)
-_FLOW_SD = const(56)
-_CURVE_SD = const(57)
-_ROW_WORDS = const(60)
+_FLOW_SD = const(7)
+_CURVE_SD = const(8)
+_PRESSURE = const(10)
+_QUIESCENT = const(12)
+_AIR = const(16)
+_STATUS = const(28)
+_FAULTS = const(29)
+_TARGET = const(30)
+_HEIGHT = const(31)
+_HEIGHT_SEGMENT = const(32)
+_SETPOINT = const(33)
+_SETPOINT_SEGMENT = const(36)
+_RAMP_START = const(40)
+_RAMPING = const(41)
+_FIRST_SEGMENT = const(44)
+_LAST_SEGMENT = const(45)
+_AIR_SD = const(49)
+_CURVE_ERROR_SD = const(51)
+_HEIGHT_SD = const(53)
+_DWELL_SLOPE = const(56)
+_ROW_WORDS = const(64)
 _KNOT_VOLUME = const(1)
 _KNOT_WORDS = const(5)
 _BUBBLE_COUNT = const(0)
@@ -70,8 +71,13 @@ _RAMP_DONE = const(16)
 _RAMP_TICKS = const(17)
 _RAMP_SHARE = const(18)
 _SECOND = const(22)
-_ROOTS = const(24)
-_ROWS = const(154)
+_ATMOSPHERE_PA = const(23)
+_SURE_UM = const(24)
+_REZERO_UM = const(25)
+_LEAK_SHARE = const(26)
+_ROOTS = const(28)
+_ROOT_STEPS = const(64)
+_ROWS = const(158)
 _ATMOSPHERE = const(101325)
 # [end of constants]
 
@@ -93,12 +99,27 @@ def _pack_state(row: ptr32, values: ptr32, at: int, n: int):  # type: ignore[no-
 
 
 @micropython.viper
+def _pack_estimate(row: ptr32, values: ptr32, at: int, n: int):  # type: ignore[no-untyped-def]
+    """Copy what ESTIMATE says of every bubble to `values[at:]`, in the schema's order."""
+    while n > 0:
+        values[at] = row[_HEIGHT] >> 4
+        values[at + 1] = row[_PRESSURE]
+        values[at + 2] = row[_TARGET]
+        values[at + 3] = row[_STATUS]
+        values[at + 4] = row[_FAULTS]
+        values[at + 5] = row[_HEIGHT_SD]
+        at += 6
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)
+        n -= 1
+
+
+@micropython.viper
 def _pack_fields(row: ptr32, values: ptr32, plan: ptr32, at: int, columns: int, n: int):  # type: ignore[no-untyped-def]
-    """Copy the words of every row that `plan` names, shifted right by what stands 8 words after each name."""
+    """Copy the words of every row that `plan` names, shifted right by what stands 9 words after each name."""
     while n > 0:
         i = 0
         while i < columns:
-            values[at] = row[plan[i]] >> plan[i + 8]
+            values[at] = row[plan[i]] >> plan[i + 9]
             at += 1
             i += 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
@@ -171,16 +192,20 @@ class Bubbles:
         state[_RAMP_DONE] = state[_RAMP_TICKS] = 1
         state[_RAMP_SHARE] = 4096
         state[_SECOND] = 1000000 // board.TICK_US
-        for index, root in enumerate(flow.roots(board.CRITICAL_RATIO)):
-            state[_ROOTS + index] = root
+        state[_SURE_UM] = board.SURE_UM
+        state[_LEAK_SHARE] = 1000000000 // board.TICK_US
+        state[_ATMOSPHERE_PA] = _ATMOSPHERE
+        self._critical = board.CRITICAL_RATIO
+        flow.fill_roots(state, _ROOTS, self._critical)
+        flow.vent_roots(state, _ROOTS + _ROOT_STEPS + 1, self._critical, _ATMOSPHERE)
         rows = self.rows
         for at in range(0, self.count * _ROW_WORDS, _ROW_WORDS):
             rows[at + _SENSOR_ZERO] = board.SENSOR_ZERO
             rows[at + _FILL_OPENS_US] = rows[at + _VENT_OPENS_US] = board.VALVE_OPENS_US
             rows[at + _FILL_CLOSES_US] = rows[at + _VENT_CLOSES_US] = board.VALVE_CLOSES_US
             rows[at + _FILL_GAIN] = rows[at + _VENT_GAIN] = flow.flow_gain(board)
-            rows[at + _FLOW_SD] = 230
-            rows[at + _CURVE_SD] = rows[at + _CURVE_ERROR_SD] = 6554
+            rows[at + _FLOW_SD] = board.FLOW_SD
+            rows[at + _CURVE_SD] = rows[at + _CURVE_ERROR_SD] = board.CURVE_SD
             rows[at + _AIR_SD] = 200
             rows[at + _TARGET] = rows[at + _RAMP_START] = board.HEIGHT_REST_UM
             rows[at + _HEIGHT] = rows[at + _SETPOINT] = board.HEIGHT_REST_UM << 4
@@ -201,9 +226,17 @@ class Bubbles:
             rows[at + _QUIESCENT] = rows[at + _DWELL_SLOPE] = 0
             rows[at + _RAMPING] = 1  # the setpoint's air is to be found again
 
+    def set_atmosphere(self, pressure_pa: int, rezero_um: int) -> None:
+        """The pressure of the air around, and how well a height must be known, or its bubble is emptied before it goes elsewhere."""
+        state = self.state
+        if state[_ATMOSPHERE_PA] != pressure_pa:
+            state[_ATMOSPHERE_PA] = pressure_pa
+            flow.vent_roots(state, _ROOTS + _ROOT_STEPS + 1, self._critical, pressure_pa)
+        state[_REZERO_UM] = rezero_um
+
     def set_targets(self, heights: "Words", at: int, ticks: int) -> None:
         """Ramp every bubble from where it is to the height (µm) in `heights[at:]` within `ticks` ticks."""
-        trajectory.set_targets(self.rows, heights, at, self.count)
+        trajectory.set_targets(self.rows, heights, at, self.count, self.state[_REZERO_UM] if ticks <= 1 else 0)
         self._ramp(ticks)
 
     def begin_step(self, words: bytearray, at: int, from_height: int) -> None:
@@ -260,10 +293,14 @@ class Bubbles:
         """Put the repeated fields of STATE at `values[at:]`."""
         _pack_state(self.rows, values, at, self.count)
 
+    def pack_estimate(self, values: "Words", at: int) -> None:
+        """Put the repeated fields of ESTIMATE at `values[at:]`."""
+        _pack_estimate(self.rows, values, at, self.count)
+
     def pack_fields(self, values: "Words", plan: "Words", at: int, columns: int) -> int:
         """Put chosen words of every bubble's row at `values[at:]`; returns how many.
 
-        `plan` names `columns` words of a row, and from its ninth place on by how many bits each is shifted right.
+        `plan` names `columns` words of a row, and from its tenth place on by how many bits each is shifted right.
         """
         _pack_fields(self.rows, values, plan, at, columns, self.count)
         return columns * self.count

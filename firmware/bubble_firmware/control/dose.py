@@ -15,28 +15,30 @@ _FILL_OPENS_US = const(1)
 _FILL_CLOSES_US = const(2)
 _VENT_OPENS_US = const(4)
 _VENT_CLOSES_US = const(5)
-_PRESSURE = const(7)
-_QUIESCENT = const(9)
-_SETTLING_US = const(12)
-_AIR = const(13)
-_AIR_IN_FLIGHT = const(15)
-_FILL_FLOW = const(16)
-_VENT_FLOW = const(17)
-_FILL_US = const(18)
-_VENT_US = const(19)
-_DUE = const(24)
-_STATUS = const(25)
-_FAULTS = const(26)
-_TARGET = const(27)
-_HEIGHT = const(28)
-_SETPOINT = const(30)
-_SETPOINT_AIR = const(31)
-_PREVIOUS_SETPOINT_AIR = const(32)
-_SETPOINT_SLOPE = const(36)
-_RAMPING = const(38)
-_FILL_RUN_US = const(39)
-_ERROR = const(40)
-_ROW_WORDS = const(60)
+_PRESSURE = const(10)
+_QUIESCENT = const(12)
+_SETTLING_US = const(15)
+_AIR = const(16)
+_AIR_IN_FLIGHT = const(18)
+_FILL_FLOW = const(19)
+_VENT_FLOW = const(20)
+_FILL_US = const(21)
+_VENT_US = const(22)
+_DUE = const(27)
+_STATUS = const(28)
+_FAULTS = const(29)
+_TARGET = const(30)
+_HEIGHT = const(31)
+_SETPOINT = const(33)
+_SETPOINT_AIR = const(34)
+_PREVIOUS_SETPOINT_AIR = const(35)
+_SETPOINT_SLOPE = const(39)
+_RAMPING = const(41)
+_FILL_RUN_US = const(42)
+_ERROR = const(43)
+_HEIGHT_SD = const(53)
+_REZERO = const(62)
+_ROW_WORDS = const(64)
 _BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _FILL_MAX_US = const(6)
@@ -47,7 +49,8 @@ _GAIN_D = const(11)
 _DEADBAND_UM = const(12)
 _SETTLED_UM = const(13)
 _REST_UM = const(14)
-_ATMOSPHERE = const(101325)
+_ATMOSPHERE_PA = const(23)
+_SURE_UM = const(24)
 _DOSE_MAX = const(50000)
 _VENT = const(0)
 _FOLLOW = const(1)
@@ -56,6 +59,7 @@ _MOVING = const(1)
 _SETTLED = const(2)
 _STOPPED = const(3)
 _FAULT = const(4)
+_UNSURE = const(5)
 _VALVE_TIME = const(4)
 # [end of constants]
 
@@ -68,6 +72,7 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
     """
     n = board[_BUBBLE_COUNT]
     tick = board[_TICK_US]
+    atmosphere = board[_ATMOSPHERE_PA]
     i = 0
     while i < n:
         if row[_DUE]:
@@ -107,6 +112,12 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                 row[_PREVIOUS_SETPOINT_AIR] = row[_AIR]
                 row[_ERROR] = 0
                 vent = tick
+            elif mode == _FOLLOW and row[_REZERO]:
+                row[_STATUS] = _MOVING
+                row[_QUIESCENT] = 0
+                row[_PREVIOUS_SETPOINT_AIR] = row[_AIR]
+                row[_ERROR] = 0
+                vent = tick
             elif mode != _FOLLOW:
                 row[_STATUS] = _STOPPED
                 row[_QUIESCENT] = 0 if energised or in_flight else 1
@@ -116,7 +127,7 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                 off = row[_TARGET] - (row[_HEIGHT] >> 4)
                 row[_STATUS] = _MOVING
                 if row[_RAMPING] == 0 and (board[_SETTLED_UM] - off | board[_SETTLED_UM] + off) >> 31 == 0:
-                    row[_STATUS] = _SETTLED
+                    row[_STATUS] = _SETTLED if row[_HEIGHT_SD] <= board[_SURE_UM] else _UNSURE
 
                 # The air that is missing, and what the setpoint's own motion asks for: feed-forward.
                 ahead = row[_SETPOINT_AIR] - row[_PREVIOUS_SETPOINT_AIR]
@@ -127,7 +138,7 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                     error += ahead
                     ahead = 0
                 deadband = (
-                    (row[_PRESSURE] + _ATMOSPHERE >> 4) * (row[_SETPOINT_SLOPE] * board[_DEADBAND_UM] >> 8) // 4000
+                    (row[_PRESSURE] + atmosphere >> 4) * (row[_SETPOINT_SLOPE] * board[_DEADBAND_UM] >> 8) // 4000
                 )
                 if ahead | (deadband - error | deadband + error) >> 31 != 0:
                     want = error * board[_GAIN_P] + (error - row[_ERROR]) * board[_GAIN_D]

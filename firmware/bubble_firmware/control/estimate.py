@@ -19,42 +19,46 @@ _SENSOR_ZERO = const(0)
 _FILL_OPENS_US = const(1)
 _FILL_CLOSES_US = const(2)
 _FILL_GAIN = const(3)
-_PRESSURE = const(7)
-_SUSPECT = const(8)
-_QUIESCENT = const(9)
-_READINGS = const(10)
-_READINGS_SUM = const(11)
-_SETTLING_US = const(12)
-_AIR = const(13)
-_AIR_METERED = const(14)
-_AIR_IN_FLIGHT = const(15)
-_FILL_FLOW = const(16)
-_VENT_FLOW = const(17)
-_FILL_US = const(18)
-_FILL_OPEN_US = const(20)
-_FILL_FULL = const(22)
-_VENT_FULL = const(23)
-_DUE = const(24)
-_STATUS = const(25)
-_FAULTS = const(26)
-_HEIGHT = const(28)
-_HEIGHT_SEGMENT = const(29)
-_FIRST_SEGMENT = const(41)
-_LAST_SEGMENT = const(42)
-_OVERPRESSURE_TICKS = const(43)
-_LOST_TICKS = const(44)
-_EMPTY_TICKS = const(45)
-_AIR_SD = const(46)
-_CURVE_ERROR = const(47)
-_CURVE_ERROR_SD = const(48)
-_CORRELATION = const(49)
-_HEIGHT_SD = const(50)
-_PEAK = const(55)
-_FLOW_SD = const(56)
-_CURVE_SD = const(57)
-_QUIET_PRESSURE = const(58)
-_FAR_TICKS = const(59)
-_ROW_WORDS = const(60)
+_FLOW_SD = const(7)
+_CURVE_SD = const(8)
+_LEAK_RATE = const(9)
+_PRESSURE = const(10)
+_SUSPECT = const(11)
+_QUIESCENT = const(12)
+_READINGS = const(13)
+_READINGS_SUM = const(14)
+_SETTLING_US = const(15)
+_AIR = const(16)
+_AIR_METERED = const(17)
+_AIR_IN_FLIGHT = const(18)
+_FILL_FLOW = const(19)
+_VENT_FLOW = const(20)
+_FILL_US = const(21)
+_FILL_OPEN_US = const(23)
+_FILL_FULL = const(25)
+_VENT_FULL = const(26)
+_DUE = const(27)
+_STATUS = const(28)
+_FAULTS = const(29)
+_HEIGHT = const(31)
+_HEIGHT_SEGMENT = const(32)
+_FIRST_SEGMENT = const(44)
+_LAST_SEGMENT = const(45)
+_OVERPRESSURE_TICKS = const(46)
+_LOST_TICKS = const(47)
+_EMPTY_TICKS = const(48)
+_AIR_SD = const(49)
+_CURVE_ERROR = const(50)
+_CURVE_ERROR_SD = const(51)
+_CORRELATION = const(52)
+_HEIGHT_SD = const(53)
+_PEAK = const(58)
+_QUIET_PRESSURE = const(59)
+_FAR_TICKS = const(60)
+_LEAKED = const(61)
+_REZERO = const(62)
+_LEAK_TICK = const(63)
+_ROW_WORDS = const(64)
 _KNOT_HEIGHT = const(0)
 _KNOT_VOLUME = const(1)
 _KNOT_PRESSURE = const(2)
@@ -69,10 +73,11 @@ _PRESSURE_MAX = const(5)
 _TUBE_PA = const(9)
 _CONTROL_MODE = const(15)
 _TICK = const(19)
-_ROOTS = const(24)
+_ATMOSPHERE_PA = const(23)
+_LEAK_SHARE = const(26)
+_ROOTS = const(28)
 _ROOT_STEPS = const(64)
-_ROWS = const(154)
-_ATMOSPHERE = const(101325)
+_ROWS = const(158)
 _READINGS_MIN = const(2)
 _READINGS_MEAN = const(8)
 _ROOT_END = const(8191)
@@ -101,11 +106,12 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
     n = board[_BUBBLE_COUNT]
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
     tick = board[_TICK_US]
+    atmosphere = board[_ATMOSPHERE_PA]
     same = 1 if mode == board[_CONTROL_MODE] else 0
     board[_CONTROL_MODE] = mode
     board[_TICK] = board[_TICK] + 1
-    supply_scale = supply + _ATMOSPHERE >> 3  # 8 Pa
-    supply_reciprocal = 0x3FFFFFFF // (supply + _ATMOSPHERE)
+    supply_scale = supply + atmosphere >> 3  # 8 Pa
+    supply_reciprocal = 0x3FFFFFFF // (supply + atmosphere)
     chosen = 0
     i = 0
     while i < n:
@@ -218,6 +224,14 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             row[_AIR_METERED] = metered
             row[_AIR_IN_FLIGHT] = in_flight
             air = row[_AIR] + metered
+            if row[_LEAK_RATE]:
+                # Pa/16 times µJ/s per kPa *16, ticks: µJ/s/1000 ticks.
+                leaked = row[_LEAKED] + (pressure >> 4) * row[_LEAK_RATE] * (board[_TICK] - row[_LEAK_TICK])
+                lost = leaked // board[_LEAK_SHARE]
+                row[_LEAKED] = leaked - lost * board[_LEAK_SHARE]
+                air -= lost
+                row[_AIR_SD] = row[_AIR_SD] + (lost >> 4)
+            row[_LEAK_TICK] = board[_TICK]
             segment = row[_HEIGHT_SEGMENT]
 
             # Without pressure it is empty.
@@ -227,8 +241,10 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 else:
                     segment = row[_FIRST_SEGMENT]
                     knot = ptr32(uint(curves) + segment)
-                    air = (pressure + _ATMOSPHERE >> 4) * knot[_KNOT_VOLUME] // 4000
+                    air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] // 4000
                     row[_AIR_SD] = _AIR_SD_EMPTY
+                    row[_REZERO] = 0
+                    row[_LEAKED] = 0
                     row[_CORRELATION] = 0
             else:
                 row[_EMPTY_TICKS] = 0
@@ -241,7 +257,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 row[_AIR_SD] = _AIR_SD_MAX
 
             # Height: by the gas law. What the open valve's tube loses is not in the bubble.
-            absolute = pressure + _ATMOSPHERE
+            absolute = pressure + atmosphere
             if row[_FILL_FULL] | row[_VENT_FULL] and chosen != i + 1:
                 if row[_FILL_FULL]:
                     absolute -= board[_TUBE_PA] * row[_FILL_FLOW] >> 4
@@ -282,7 +298,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 while (pressure - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - pressure) >> 31:
                     if high == row[_LAST_SEGMENT] and low == row[_FIRST_SEGMENT]:
                         break
-                    if upwards and high != row[_LAST_SEGMENT] or low == row[_FIRST_SEGMENT]:
+                    if (upwards and high != row[_LAST_SEGMENT]) or low == row[_FIRST_SEGMENT]:
                         upwards = 0
                         high += 4 * _KNOT_WORDS
                         segment = high
@@ -303,7 +319,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                     off = 1024
                 height = knot[_KNOT_HEIGHT] + (off * (knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]) >> 10)
                 volume = knot[_KNOT_VOLUME] + (off * (knot[_KNOT_WORDS + _KNOT_VOLUME] - knot[_KNOT_VOLUME]) >> 10)
-                row[_AIR] = (pressure + _ATMOSPHERE >> 4) * volume // 4000
+                row[_AIR] = (pressure + atmosphere >> 4) * volume // 4000
                 row[_AIR_SD] = _AIR_SD_FAR
                 row[_CORRELATION] = 0
                 row[_CURVE_ERROR] = 0

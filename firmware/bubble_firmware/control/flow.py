@@ -6,16 +6,14 @@ The root stands in two tables, of `ROOT_STEPS` + 1 entries each: for filling ove
 for venting, p₂ being the atmosphere, over p₁ − p₂ in steps of 1024 Pa, in 8 Pa. What stands before it is the flow gain.
 """
 
-from array import array
-
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
 if TYPE_CHECKING:
+    from array import array
     from types import ModuleType
 
 # [constants] bubble_firmware.control.state_layout: used
 _ROOT_STEPS = const(64)
-_ATMOSPHERE = const(101325)
 # [end of constants]
 
 
@@ -25,17 +23,21 @@ def flow_gain(board: "ModuleType") -> int:
     return board.CONDUCTANCE * 1342 // (10 * (256 - board.CRITICAL_RATIO))
 
 
-def roots(critical: int) -> "array[int]":
-    """The tables of roots for the critical ratio `critical`/256."""
-    table = array("i", bytearray(4 * 2 * (_ROOT_STEPS + 1)))
+def fill_roots(table: "array[int]", at: int, critical: int) -> None:
+    """Put the roots of filling, for the critical ratio `critical`/256, at `table[at:]`."""
     choke = 256 - critical  # from this share of pressure on, *256, flow does not grow
     for step in range(_ROOT_STEPS + 1):
         x = min(2 * step, choke)  # *256
-        table[step] = _root(x * (2 * choke - x) << 12)
+        table[at + step] = _root(x * (2 * choke - x) << 12)
+
+
+def vent_roots(table: "array[int]", at: int, critical: int, atmosphere: int) -> None:
+    """Put the roots of venting into air of the pressure `atmosphere`, Pa, at `table[at:]`."""
+    for step in range(_ROOT_STEPS + 1):
         d = 1024 * step
-        p1 = d + _ATMOSPHERE
-        table[_ROOT_STEPS + 1 + step] = _root(d * (p1 * (256 - 2 * critical) // 256 + _ATMOSPHERE)) >> 3
-    return table
+        p1 = d + atmosphere
+        # In units of 8 Pa, so that no product needs more than a small integer.
+        table[at + step] = _root((d >> 3) * ((p1 >> 3) * (256 - 2 * critical) // 256 + (atmosphere >> 3)))
 
 
 def _root(square: int) -> int:

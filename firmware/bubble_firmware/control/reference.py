@@ -16,23 +16,23 @@ worse than thought: they are doubled, until pressure and air agree.
 from bubble_protocol.mpy_compat import const, micropython, ptr32, uint
 
 # [constants] bubble_firmware.control.state_layout: used
-_AIR = const(13)
-_HEIGHT = const(28)
-_HEIGHT_SEGMENT = const(29)
-_FIRST_SEGMENT = const(41)
-_LAST_SEGMENT = const(42)
-_AIR_SD = const(46)
-_CURVE_ERROR = const(47)
-_CURVE_ERROR_SD = const(48)
-_CORRELATION = const(49)
-_PRESSURE_RATIO = const(51)
-_DWELL_HEIGHT = const(52)
-_DWELL_SLOPE = const(53)
-_REFERENCE_TICK = const(54)
-_PEAK = const(55)
-_CURVE_SD = const(57)
-_QUIET_PRESSURE = const(58)
-_ROW_WORDS = const(60)
+_CURVE_SD = const(8)
+_AIR = const(16)
+_HEIGHT = const(31)
+_HEIGHT_SEGMENT = const(32)
+_FIRST_SEGMENT = const(44)
+_LAST_SEGMENT = const(45)
+_AIR_SD = const(49)
+_CURVE_ERROR = const(50)
+_CURVE_ERROR_SD = const(51)
+_CORRELATION = const(52)
+_PRESSURE_RATIO = const(54)
+_DWELL_HEIGHT = const(55)
+_DWELL_SLOPE = const(56)
+_REFERENCE_TICK = const(57)
+_PEAK = const(58)
+_QUIET_PRESSURE = const(59)
+_ROW_WORDS = const(64)
 _KNOT_HEIGHT = const(0)
 _KNOT_PRESSURE = const(2)
 _KNOT_SLOPE = const(3)
@@ -40,8 +40,8 @@ _KNOT_WORDS = const(5)
 _BUBBLE_COUNT = const(0)
 _TICK = const(19)
 _SECOND = const(22)
-_ROWS = const(154)
-_ATMOSPHERE = const(101325)
+_ATMOSPHERE_PA = const(23)
+_ROWS = const(158)
 # [end of constants]
 
 _DWELL_UM = const(100)  # a bubble that has moved further dwells somewhere else
@@ -62,12 +62,13 @@ def reference(row: ptr32, board: ptr32, bubble: int):
     """Compare the pressure of the bubble of this number, from 1, which `estimate` has found quiet, with its curve."""
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * board[_BUBBLE_COUNT]))
     row = ptr32(uint(row) + 4 * _ROW_WORDS * (bubble - 1))
+    atmosphere = board[_ATMOSPHERE_PA]
     height = row[_HEIGHT]
     knot = ptr32(uint(curves) + row[_HEIGHT_SEGMENT])
     pressure = row[_QUIET_PRESSURE]
 
     # Volume per height there, and air per height at this pressure.
-    air_slope = (pressure + _ATMOSPHERE >> 8) * knot[_KNOT_SLOPE] // 1000  # µJ/µm, *64
+    air_slope = (pressure + atmosphere >> 8) * knot[_KNOT_SLOPE] // 1000  # µJ/µm, *64
     reach = (row[_AIR_SD] << 6) // (air_slope + 1)
     if reach < _NEAR_UM:
         reach = _NEAR_UM

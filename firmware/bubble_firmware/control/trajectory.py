@@ -6,23 +6,27 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 # [constants] bubble_firmware.control.state_layout: used
 # [constants] bubble_protocol.schema.statuses: used
 # [constants] bubble_protocol.steps: used
-_QUIESCENT = const(9)
-_DUE = const(24)
-_FAULTS = const(26)
-_TARGET = const(27)
-_HEIGHT = const(28)
-_SETPOINT = const(30)
-_SETPOINT_AIR = const(31)
-_SETPOINT_SEGMENT = const(33)
-_SETPOINT_VOLUME = const(34)
-_SETPOINT_PRESSURE = const(35)
-_SETPOINT_SLOPE = const(36)
-_RAMP_START = const(37)
-_RAMPING = const(38)
-_FIRST_SEGMENT = const(41)
-_LAST_SEGMENT = const(42)
-_PRESSURE_RATIO = const(51)
-_ROW_WORDS = const(60)
+_FLOW_SD = const(7)
+_QUIESCENT = const(12)
+_DUE = const(27)
+_STATUS = const(28)
+_FAULTS = const(29)
+_TARGET = const(30)
+_HEIGHT = const(31)
+_SETPOINT = const(33)
+_SETPOINT_AIR = const(34)
+_SETPOINT_SEGMENT = const(36)
+_SETPOINT_VOLUME = const(37)
+_SETPOINT_PRESSURE = const(38)
+_SETPOINT_SLOPE = const(39)
+_RAMP_START = const(40)
+_RAMPING = const(41)
+_FIRST_SEGMENT = const(44)
+_LAST_SEGMENT = const(45)
+_HEIGHT_SD = const(53)
+_PRESSURE_RATIO = const(54)
+_REZERO = const(62)
+_ROW_WORDS = const(64)
 _KNOT_HEIGHT = const(0)
 _KNOT_VOLUME = const(1)
 _KNOT_PRESSURE = const(2)
@@ -32,10 +36,13 @@ _BUBBLE_COUNT = const(0)
 _RAMP_DONE = const(16)
 _RAMP_TICKS = const(17)
 _RAMP_SHARE = const(18)
-_ROWS = const(154)
-_ATMOSPHERE = const(101325)
+_ATMOSPHERE_PA = const(23)
+_ROWS = const(158)
 _LEAVE = const(65535)
 # [end of constants]
+
+_WAY_UM = const(1000)
+_FLOW_SD_FAIR = const(1311)  # 2 %, *65536
 
 
 @micropython.viper
@@ -48,6 +55,7 @@ def move_setpoints(row: ptr32, board: ptr32):
         board[_RAMP_DONE] = board[_RAMP_DONE] + 1
         board[_RAMP_SHARE] = (board[_RAMP_DONE] << 12) // board[_RAMP_TICKS]
     n = board[_BUBBLE_COUNT]
+    atmosphere = board[_ATMOSPHERE_PA]
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
     while n > 0:
         if row[_DUE]:
@@ -81,15 +89,25 @@ def move_setpoints(row: ptr32, board: ptr32):
             expected = row[_SETPOINT_PRESSURE] * (4096 + row[_PRESSURE_RATIO]) >> 12
             if expected > 60000:
                 expected = 60000
-            row[_SETPOINT_AIR] = (expected + _ATMOSPHERE >> 4) * row[_SETPOINT_VOLUME] // 4000
+            row[_SETPOINT_AIR] = (expected + atmosphere >> 4) * row[_SETPOINT_VOLUME] // 4000
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         n -= 1
 
 
 @micropython.viper
-def set_targets(row: ptr32, heights: ptr32, at: int, n: int):
-    """Begin every bubble's way from where it is to the height (µm) in `heights[at:]`."""
+def set_targets(row: ptr32, heights: ptr32, at: int, n: int, rezero_um: int):
+    """Begin every bubble's way from where it is to the height (µm) in `heights[at:]`.
+
+    Where its height is known no better than `rezero_um`, not 0, and metering it afresh would help, a bubble that has some way to
+    go is emptied first.
+    """
     while n > 0:
+        way = heights[at] - (row[_HEIGHT] >> 4)
+        row[_REZERO] = 0
+        if way < 0:
+            way = 0 - way
+        if rezero_um and way > _WAY_UM and row[_HEIGHT_SD] > rezero_um and row[_FLOW_SD] < _FLOW_SD_FAIR:
+            row[_REZERO] = 1 if row[_STATUS] & 3 else 0
         row[_RAMP_START] = row[_HEIGHT] >> 4
         row[_TARGET] = heights[at]
         row[_QUIESCENT] = 0
@@ -110,6 +128,7 @@ def set_next_targets(row: ptr32, heights: ptr16, at: int, n: int, from_height: i
         target = heights[at]
         if target != _LEAVE:
             row[_TARGET] = target if target > rest_um else rest_um  # lower would be the end of the ramp before its time
+        row[_REZERO] = 0
         row[_QUIESCENT] = 0
         row[_RAMPING] = 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
@@ -123,6 +142,7 @@ def hold_position(row: ptr32, n: int):
     while n > 0:
         row[_RAMP_START] = row[_HEIGHT] >> 4
         row[_TARGET] = row[_RAMP_START]
+        row[_REZERO] = 0
         row[_QUIESCENT] = 0
         row[_RAMPING] = 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
@@ -135,6 +155,7 @@ def retract(row: ptr32, height: int, n: int):
     while n > 0:
         row[_RAMP_START] = height
         row[_TARGET] = height
+        row[_REZERO] = 0
         row[_QUIESCENT] = 0
         row[_RAMPING] = 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)

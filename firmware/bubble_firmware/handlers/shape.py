@@ -1,4 +1,4 @@
-"""Requests about the shape as a whole: SHOW, STATE, STOP, VENT."""
+"""Requests about the shape as a whole: SHOW, STATE, ESTIMATE, STOP, VENT."""
 
 from bubble_firmware.control.trajectory import first_above
 from bubble_firmware.link.reply import Handlers
@@ -13,15 +13,18 @@ if TYPE_CHECKING:
     from bubble_firmware.control.bubbles import Bubbles
     from bubble_firmware.link.reply import Reply
 
-# [constants] bubble_protocol.schema.messages: SHOW STATE STOP VENT
+# [constants] bubble_protocol.schema.messages: ESTIMATE SHOW STATE STOP VENT
+# [constants] bubble_protocol.schema.system: CAN_ESTIMATE
 # [constants] bubble_protocol.schema.errors: BOARD_FAULT NO_ELEMENT OUT_OF_RANGE WRONG_COUNT
 # [constants] bubble_protocol.schema.faults: VENTING as VENTING_FAULTS
 # [constants] message SHOW as SHOW: *
 # [constants] message STATE_REPLY as STATE: TICKS MODE HEIGHT_UM
+_ESTIMATE = const(17)
 _SHOW = const(4)
 _STATE = const(5)
 _STOP = const(11)
 _VENT = const(12)
+_CAN_ESTIMATE = const(64)
 _BOARD_FAULT = const(9)
 _NO_ELEMENT = const(255)
 _OUT_OF_RANGE = const(3)
@@ -39,6 +42,8 @@ _STATE_HEIGHT_UM = const(2)
 class ShapeHandlers(Handlers):
     """The shape of `bubbles`."""
 
+    capabilities = _CAN_ESTIMATE
+
     def __init__(
         self, reply: "Reply", board: "ModuleType", state: "BoardState", bubbles: "Bubbles", commands: "Commands"
     ):
@@ -50,7 +55,13 @@ class ShapeHandlers(Handlers):
 
     def requests(self) -> "dict[int, Callable[[int], None]]":
         """See `Handlers`."""
-        return {_SHOW: self._show, _STATE: self._tell_state, _STOP: self._stop, _VENT: self._vent}
+        return {
+            _SHOW: self._show,
+            _STATE: self._tell_state,
+            _ESTIMATE: self._tell_estimate,
+            _STOP: self._stop,
+            _VENT: self._vent,
+        }
 
     def _show(self, count: int) -> None:
         values = self._reply.values
@@ -75,6 +86,13 @@ class ShapeHandlers(Handlers):
         values[_STATE_TICKS] = self._state.clock.ticks
         values[_STATE_MODE] = self._state.safety.mode
         self._bubbles.pack_state(values, _STATE_HEIGHT_UM)
+        self._reply.reply(self._bubbles.count)
+
+    def _tell_estimate(self, count: int) -> None:
+        values = self._reply.values
+        values[_STATE_TICKS] = self._state.clock.ticks
+        values[_STATE_MODE] = self._state.safety.mode
+        self._bubbles.pack_estimate(values, _STATE_HEIGHT_UM)
         self._reply.reply(self._bubbles.count)
 
     def _stop(self, count: int) -> None:

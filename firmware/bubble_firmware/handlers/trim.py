@@ -1,8 +1,9 @@
-"""Requests about the trim of every bubble: TRIM_WRITE, TRIM_READ."""
+"""Requests about the trim of every bubble: CALIBRATION_WRITE and _READ, and TRIM_WRITE and _READ, which know one valve."""
 
 from bubble_firmware.control import trim as trims
 from bubble_firmware.handlers.vented import is_vented
 from bubble_firmware.link.reply import Handlers
+from bubble_protocol import codec, frame
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
 if TYPE_CHECKING:
@@ -13,10 +14,15 @@ if TYPE_CHECKING:
     from bubble_firmware.link.reply import Reply
     from bubble_firmware.safety.state import SafetyState
 
-# [constants] bubble_protocol.schema.messages: TRIM_READ TRIM_WRITE
+# [constants] bubble_protocol.schema.messages: CALIBRATION_READ CALIBRATION_WRITE TRIM_READ TRIM_WRITE
+# [constants] message CALIBRATION_READ_REPLY as CALIBRATION: FIRST ZERO
 # [constants] bubble_protocol.schema.errors: NO_ELEMENT OUT_OF_RANGE WRONG_COUNT
+_CALIBRATION_READ = const(30)
+_CALIBRATION_WRITE = const(29)
 _TRIM_READ = const(26)
 _TRIM_WRITE = const(25)
+_CALIBRATION_FIRST = const(0)
+_CALIBRATION_ZERO = const(1)
 _NO_ELEMENT = const(255)
 _OUT_OF_RANGE = const(3)
 _WRONG_COUNT = const(4)
@@ -31,29 +37,61 @@ class TrimHandlers(Handlers):
         self._bubbles = board.BUBBLES
         self._safety = safety
         self._trim = trim
+        message = codec.BY_ID[_CALIBRATION_WRITE]
+        self._most = (frame.PAYLOAD_MAX - message.fixed_size) // message.stride  # trims for which a frame has room
 
     def requests(self) -> "dict[int, Callable[[int], None]]":
         """See `Handlers`."""
-        return {_TRIM_WRITE: self._write, _TRIM_READ: self._read}
+        return {
+            _CALIBRATION_WRITE: self._write,
+            _CALIBRATION_READ: self._read,
+            _TRIM_WRITE: self._write_short,
+            _TRIM_READ: self._read_short,
+        }
 
-    def _write(self, count: int) -> None:
+    def _write_short(self, count: int) -> None:
         reply = self._reply
-        values = reply.values
-        trim = self._trim
         if count != self._bubbles:
             reply.refuse(_WRONG_COUNT, 0, _NO_ELEMENT, count, self._bubbles, self._bubbles)
             return
+        self._trim.widen(reply.values)
+        self._use(0, 0, count)
+
+    def _read_short(self, count: int) -> None:
+        self._trim.read_short(self._reply.values)
+        self._reply.reply(self._bubbles)
+
+    def _write(self, count: int) -> None:
+        reply = self._reply
+        first = reply.values[_CALIBRATION_FIRST]
+        if count == 0 or first + count > self._bubbles:
+            reply.refuse(_WRONG_COUNT, _CALIBRATION_ZERO, _NO_ELEMENT, count, 1, max(0, self._bubbles - first))
+            return
+        self._use(_CALIBRATION_ZERO, first, count)
+
+    def _use(self, at: int, first: int, count: int) -> None:
+        reply = self._reply
+        values = reply.values
+        trim = self._trim
         if not is_vented(reply, self._safety):
             return
-        invalid = trim.first_invalid(values)
+        invalid = trim.first_invalid(values, at, count)
         if invalid >= 0:
-            field = invalid % trims.COUNT
-            bubble = invalid // trims.COUNT
-            reply.refuse(_OUT_OF_RANGE, field, bubble, values[invalid], trim.low[field], trim.high[field])
+            number = invalid % trims.COUNT
+            field = at + number if at else min(number, trims.SHORT - 1)
+            reply.refuse(
+                _OUT_OF_RANGE, field, invalid // trims.COUNT, values[at + invalid], trim.low[number], trim.high[number]
+            )
             return
-        trim.use(values)
+        trim.use(values, at, first, count)
         reply.acknowledge()
 
     def _read(self, count: int) -> None:
-        self._trim.read(self._reply.values)
-        self._reply.reply(self._bubbles)
+        reply = self._reply
+        first = reply.values[_CALIBRATION_FIRST]
+        if first >= self._bubbles:
+            reply.refuse(_OUT_OF_RANGE, _CALIBRATION_FIRST, _NO_ELEMENT, first, 0, self._bubbles - 1)
+            return
+        count = min(self._bubbles - first, self._most)
+        self._trim.read(reply.values, _CALIBRATION_ZERO, first, count)
+        reply.reply(count)

@@ -16,14 +16,15 @@ if TYPE_CHECKING:
 # [constants] bubble_protocol.schema.messages: TELEMETRY TELEMETRY_FIELDS
 # [constants] message TELEMETRY as TELEMETRY: TICKS MODE HEIGHT_UM
 # [constants] message TELEMETRY_FIELDS as FIELDS: *
-_PRESSURE = const(7)
-_FILL_US = const(18)
-_VENT_US = const(19)
-_STATUS = const(25)
-_FAULTS = const(26)
-_TARGET = const(27)
-_HEIGHT = const(28)
-_SETPOINT = const(30)
+_PRESSURE = const(10)
+_FILL_US = const(21)
+_VENT_US = const(22)
+_STATUS = const(28)
+_FAULTS = const(29)
+_TARGET = const(30)
+_HEIGHT = const(31)
+_SETPOINT = const(33)
+_HEIGHT_SD = const(53)
 _TELEMETRY = const(7)
 _TELEMETRY_FIELDS = const(28)
 _TELEMETRY_TICKS = const(0)
@@ -48,8 +49,9 @@ _COLUMNS = (  # where each field stands in a bubble's row, and by how many bits 
     (_SETPOINT, 4),
     (_FILL_US, 0),
     (_VENT_US, 0),
+    (_HEIGHT_SD, 0),
 )
-_SHIFTS = const(8)  # where in the plan the shifts begin
+_SHIFTS = const(9)  # where in the plan the shifts begin
 
 
 class Telemetry:

@@ -143,9 +143,14 @@ class Content:
     def _take_trim(self, data: bytearray, at: int, size: int) -> bool:
         n = self._board.BUBBLES
         stride = size // (2 * n)  # words of one bubble in the record
-        for bubble in range(n):
-            for number in range(min(stride, trims.COUNT)):
-                self._trims[bubble * trims.COUNT + number] = get16(data, at + 2 * (bubble * stride + number))
+        if stride == trims.SHORT:  # an older record: of both valves
+            for index in range(n * stride):
+                self._trims[index] = get16(data, at + 2 * index)
+            self._trim.widen(self._trims)
+        else:
+            for bubble in range(n):
+                for number in range(min(stride, trims.COUNT)):
+                    self._trims[bubble * trims.COUNT + number] = get16(data, at + 2 * (bubble * stride + number))
         return self._trim.first_invalid(self._trims) < 0
 
 

@@ -9,21 +9,25 @@ from bubble_protocol.steps import small_word
 if TYPE_CHECKING:
     from types import ModuleType
 
+    from bubble_firmware.control.bubbles import Bubbles
     from bubble_firmware.safety.deadman import Deadman
     from bubble_firmware.safety.fault_monitor import FaultMonitor
 
-# [constants] bubble_protocol.schema.settings: BUDGET_KPA_S DEADMAN_HOLD DEADMAN_VENT
+# [constants] bubble_protocol.schema.settings: ATMOSPHERE_PA BUDGET_KPA_S DEADMAN_HOLD DEADMAN_VENT REZERO_UM
+_ATMOSPHERE_PA = const(3)
 _BUDGET_KPA_S = const(2)
 _DEADMAN_HOLD = const(0)
 _DEADMAN_VENT = const(1)
+_REZERO_UM = const(4)
 # [end of constants]
 
 
 class Settings:
     """`values` in use, one per setting; `lows` and `highs` are the hard limits; `version` counts changes since boot."""
 
-    def __init__(self, board: "ModuleType", deadman: "Deadman", monitor: "FaultMonitor"):
+    def __init__(self, board: "ModuleType", deadman: "Deadman", monitor: "FaultMonitor", bubbles: "Bubbles"):
         self._deadman = deadman
+        self._bubbles = bubbles
         self._monitor = monitor
         self.count = len(SETTINGS)
         self.values = array("i")
@@ -75,3 +79,4 @@ class Settings:
         values = self.values
         self._deadman.configure(values[_DEADMAN_HOLD], values[_DEADMAN_VENT])
         self._monitor.set_budget(values[_BUDGET_KPA_S])
+        self._bubbles.set_atmosphere(values[_ATMOSPHERE_PA], values[_REZERO_UM])

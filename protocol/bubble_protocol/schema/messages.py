@@ -38,6 +38,7 @@ CLEAR = const(0x0D)
 TICKS = const(0x0E)
 RESTART = const(0x0F)
 LAYOUT = const(0x10)
+ESTIMATE = const(0x11)
 STORE_SAVE = const(0x16)
 STORE_INFO = const(0x17)
 STORE_RESET = const(0x18)
@@ -51,6 +52,8 @@ SEQUENCE_CONTROL = const(0x24)
 SEQUENCE_STATE = const(0x25)
 SEQUENCE_EVENT = const(0x26)
 SUBSCRIBE_FIELDS = const(0x1B)
+CALIBRATION_WRITE = const(0x1D)
+CALIBRATION_READ = const(0x1E)
 TELEMETRY_FIELDS = const(0x1C)
 FAULTS_READ = const(0x12)
 FAULTS_ACK = const(0x13)
@@ -96,6 +99,26 @@ _TRIM = (
     ("opens_us", U16, "µs", None, None, "from current to an open valve"),
     ("closes_us", U16, "µs", None, None, "from no current to a closed valve"),
     ("flow_gain", U16, "", None, None, "flow of the restrictor: root of pressures (8 Pa) to µJ/ms, /65536"),
+)
+_FIRST = ("first", U8, "", None, None, "number of the bubble that the first entry is of")
+_CALIBRATION = (
+    ("zero", U16, "counts", None, None, "what the sensor reads at no pressure"),
+    ("fill_opens_us", U16, "µs", None, None, "of the fill valve, from current to open"),
+    ("fill_closes_us", U16, "µs", None, None, "from no current to closed"),
+    ("fill_gain", U16, "", None, None, "flow of its restrictor: root of pressures (8 Pa) to µJ/ms, /65536"),
+    ("vent_opens_us", U16, "µs", None, None, "the same of the vent valve"),
+    ("vent_closes_us", U16, "µs", None, None, "from no current to closed"),
+    ("vent_gain", U16, "", None, None, "flow of its restrictor"),
+    ("flow_sd", U16, "", None, None, "standard deviation of both flows, share, /65536"),
+    (
+        "curve_sd",
+        U16,
+        "",
+        None,
+        None,
+        "standard deviation of the table's pressures, with the rubber's memory, share, /65536",
+    ),
+    ("leak", U16, "µJ/s per kPa", None, None, "air that the bubble loses, /16"),
 )
 _STORE = (
     ("source", U8, "", None, None, "see store"),
@@ -325,9 +348,9 @@ MESSAGES = (
         "use what the firmware was made with, and store nothing else; only while vented",
     ),
     (STORE_RESET | REPLY, "STORE_RESET_REPLY", _STORE, (), "as it was made"),
-    (TRIM_WRITE, "TRIM_WRITE", (), _TRIM, "use these figures, one entry per bubble; only while vented"),
+    (TRIM_WRITE, "TRIM_WRITE", (), _TRIM, "use these figures, for both valves of a bubble; only while vented"),
     (TRIM_WRITE | REPLY, "TRIM_WRITE_REPLY", (_TICKS,), (), "figures in use"),
-    (TRIM_READ, "TRIM_READ", (), (), "what figures are in use?"),
+    (TRIM_READ, "TRIM_READ", (), (), "what figures are in use, of the fill valves?"),
     (TRIM_READ | REPLY, "TRIM_READ_REPLY", (), _TRIM, "the figures in use, one entry per bubble"),
     (
         SEQUENCE_BEGIN,
@@ -517,6 +540,30 @@ MESSAGES = (
         ),
         (),
         "refused, nothing was changed; in place of the reply",
+    ),
+    (ESTIMATE, "ESTIMATE", (), (), "what shape are you in, and how sure are you?"),
+    (
+        ESTIMATE | REPLY,
+        "ESTIMATE_REPLY",
+        (_TICKS, ("mode", U8, "", None, None, "see mode")),
+        (*_BUBBLES, ("sd_um", U16, "µm", None, None, "standard deviation of the estimated height")),
+        "the state of every bubble, and how well it is known",
+    ),
+    (
+        CALIBRATION_WRITE,
+        "CALIBRATION_WRITE",
+        (_FIRST,),
+        _CALIBRATION,
+        "use these figures for the first bubble and those that follow, one entry for each; only while vented",
+    ),
+    (CALIBRATION_WRITE | REPLY, "CALIBRATION_WRITE_REPLY", (_TICKS,), (), "figures in use"),
+    (CALIBRATION_READ, "CALIBRATION_READ", (_FIRST,), (), "what figures are in use, from this bubble on?"),
+    (
+        CALIBRATION_READ | REPLY,
+        "CALIBRATION_READ_REPLY",
+        (_FIRST,),
+        _CALIBRATION,
+        "the figures in use, one entry for each bubble, as many as a frame has room for",
     ),
     (LAYOUT, "LAYOUT", (), (), "where are your bubbles?"),
     (

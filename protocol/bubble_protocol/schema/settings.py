@@ -1,7 +1,7 @@
 """What can be set: (number, name, unit, least, most, default, meaning). None: the board's."""
 
 # What can be set: (number, name, unit, least, most, default, meaning). None: the board's.
-DEADMAN_HOLD, DEADMAN_VENT, BUDGET_KPA_S = range(3)
+DEADMAN_HOLD, DEADMAN_VENT, BUDGET_KPA_S, ATMOSPHERE_PA, REZERO_UM = range(5)
 SETTINGS = (
     (
         DEADMAN_HOLD,
@@ -29,5 +29,23 @@ SETTINGS = (
         None,
         None,
         "pressure above the board's threshold times time, for each bubble",
+    ),
+    (
+        ATMOSPHERE_PA,
+        "atmosphere_pa",
+        "Pa",
+        60000,
+        110000,
+        101325,
+        "pressure of the air around, which heights are reckoned with",
+    ),
+    (
+        REZERO_UM,
+        "rezero_um",
+        "µm",
+        0,
+        5000,
+        250,
+        "standard deviation of its height from which a bubble is emptied before it goes elsewhere; 0: never",
     ),
 )

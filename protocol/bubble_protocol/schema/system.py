@@ -1,7 +1,7 @@
 """What a device can do, how its time wraps, and what RESTART leads to."""
 
 # Bits of `capabilities`.
-DELIVERY, SAFETY, STORE, CAN_SEQUENCES, CAN_CHOOSE_TELEMETRY, CAN_TELL_LAYOUT = 1, 2, 4, 8, 16, 32
+DELIVERY, SAFETY, STORE, CAN_SEQUENCES, CAN_CHOOSE_TELEMETRY, CAN_TELL_LAYOUT, CAN_ESTIMATE = 1, 2, 4, 8, 16, 32, 64
 CAPABILITIES = (
     (DELIVERY, "delivery", "sessions, a window, replies kept: every request counts once"),
     (SAFETY, "safety", "a deadman, a fault log, settings"),
@@ -9,6 +9,7 @@ CAPABILITIES = (
     (CAN_SEQUENCES, "sequences", "sequences are played on the device's own clock"),
     (CAN_CHOOSE_TELEMETRY, "telemetry_fields", "SUBSCRIBE_FIELDS: telemetry of chosen columns"),
     (CAN_TELL_LAYOUT, "layout", "LAYOUT: where its bubbles are"),
+    (CAN_ESTIMATE, "estimate", "ESTIMATE, CALIBRATION: how well heights are known, and figures of both valves"),
 )
 
 TICKS_WRAP = 1 << 30  # device time counts up to here and goes on from 0: after 62 days at 5 ms. No integer becomes long

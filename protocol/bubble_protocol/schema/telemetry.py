@@ -10,4 +10,5 @@ COLUMNS = (
     (32, "setpoint", "µm", 1, "where the way to the target stands now"),
     (64, "fill", "µs", 1, "how long the fill valve is energised in this period"),
     (128, "vent", "µs", 1, "the same of the vent valve"),
+    (256, "sd", "µm", 1, "standard deviation of the estimated height"),
 )

@@ -37,7 +37,9 @@ QUIET_US = 7000  # after a valve has closed, until tube and membrane have settle
 
 # Control, in 1/256.
 GAIN_P = 230
-GAIN_I = 4
 GAIN_D = 16
 DEADBAND_UM = 30  # no dose for less
-SETTLED_UM = 120  # a bubble this near its target counts as there
+SETTLED_UM = 120  # a bubble this near its target counts as there,
+SURE_UM = 180  # and as settled where its height is known as well as that: one standard deviation
+FLOW_SD = 3900  # how far restrictors are from CONDUCTANCE, share, *65536: 6 %, without calibration
+CURVE_SD = 6554  # and pressures from the table's, the memory of the rubber included: 10 %
