@@ -227,7 +227,7 @@ class Bubbles:
             rows[at + _RAMPING] = 1  # the setpoint's air is to be found again
 
     def set_atmosphere(self, pressure_pa: int, rezero_um: int) -> None:
-        """The pressure of the air around, and how well a height must be known, or its bubble is emptied before it goes elsewhere."""
+        """Take up the pressure of the air around, and how well a height must be known for its bubble not to be emptied first."""
         state = self.state
         if state[_ATMOSPHERE_PA] != pressure_pa:
             state[_ATMOSPHERE_PA] = pressure_pa

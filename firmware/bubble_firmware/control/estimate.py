@@ -92,6 +92,7 @@ _EMPTY_US = const(100000)
 _AIR_SD_EMPTY = const(200)  # µJ
 _AIR_SD_MAX = const(60000)
 _FAR_PA = const(10000)
+_FAR_MOVING_PA = const(15000)  # with what tube, rubber and steep curve add while it moves
 _FAR_MAX = const(3)  # ticks
 _AIR_SD_FAR = const(20000)
 
@@ -287,7 +288,8 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             # A pressure that no memory explains: the air is not what was metered. It is what the curve says, there where it
             # has this pressure next to the height so far, because a bubble stays on the branch where it was.
             far = pressure - knot[_KNOT_PRESSURE] - (knot[_KNOT_PRESSURE] * (row[_CURVE_ERROR] >> 4) >> 12)
-            if (_FAR_PA - far | _FAR_PA + far) >> 31 == 0 or row[_SUSPECT]:
+            most = _FAR_MOVING_PA if row[_STATUS] & 3 else _FAR_PA
+            if (most - far | most + far) >> 31 == 0 or row[_SUSPECT]:
                 row[_FAR_TICKS] = 0
             elif row[_STATUS] & 3 and row[_FAR_TICKS] < _FAR_MAX:
                 row[_FAR_TICKS] = row[_FAR_TICKS] + 1
