@@ -59,7 +59,7 @@ def test_show_returns_when_all_is_settled(skin):
         target = random_heights(rng, skin.info.bubbles)
         before = skin.state().time
         state = skin.show(target)
-        assert state.settled
+        assert state.arrived
         assert state.mode == "active"
         assert state.time - before < 1.0
         assert state.target_mm == pytest.approx(target, abs=0.001)
@@ -132,7 +132,7 @@ def test_a_ramp_is_waited_for(skin, start):
     before = skin.state().time
     state = skin.show(np.full(n, 12.0), over=2.0)
     assert 1.9 <= state.time - before <= 3.0
-    assert state.settled
+    assert state.arrived
     assert state.height_mm == pytest.approx(12.0, abs=NEAR)
 
 
@@ -151,6 +151,6 @@ def test_a_dome_settles_and_stays(skin, watch):
     distance = np.linalg.norm(skin.layout.positions_mm, axis=1) / skin.layout.pitch_mm
     dome = np.interp(distance, [0, 1, 2], [12.0, 6.8, 5.5])  # so low around the centre that nobody touches
     state = skin.show(dome)
-    assert state.settled
+    assert state.arrived
     assert state.height_mm == pytest.approx(dome, abs=NEAR)
     assert watch(0.3).height_mm[-1] == pytest.approx(dome, abs=NEAR)

@@ -16,7 +16,7 @@ from bubbleskin.device.layout import find_layout
 from bubbleskin.device.settings import Setting, changes, settings_of
 from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
-from bubbleskin.device.trim import Trim
+from bubbleskin.device.trim import ROWS_MOST, Trim
 from bubbleskin.device.trim import check as check_trim
 from bubbleskin.errors import DeviceFault, InvalidInput
 from bubbleskin.fault_guide import remedies
@@ -113,7 +113,7 @@ class AsyncSkin:
         while True:
             state = await self.state()
             await self._check(state)
-            if state.settled:
+            if state.arrived:
                 return state
             if self.link.transport.now() >= deadline:
                 raise self._unsettled(state, patience)
@@ -141,7 +141,8 @@ class AsyncSkin:
 
     async def state(self) -> State:
         """See `Skin.state`."""
-        return State.of(await self.link.call("STATE"), self.info.tick)
+        request = "ESTIMATE" if self.info.tells_sd else "STATE"
+        return State.of(await self.link.call(request), self.info.tick)
 
     async def health(self) -> Health:
         """See `Skin.health`."""
@@ -268,14 +269,23 @@ class AsyncSkin:
 
     async def trim(self) -> Trim:
         """See `Skin.trim`."""
-        return Trim.of(await self.link.call("TRIM_READ"))
+        if not self.info.tells_sd:
+            return Trim.of([await self.link.call("TRIM_READ")])
+        replies: list[Message] = []
+        while (first := sum(len(reply.columns["zero"]) for reply in replies)) < self.info.bubbles:
+            replies.append(await self.link.call("CALIBRATION_READ", (first,)))
+        return Trim.of(replies)
 
     async def upload_trim(self, trim: Trim, save: bool = False, *, anyway: bool = False) -> None:
         """See `Skin.upload_trim`."""
         rows = trim.rows(self.info.bubbles)
         if not anyway:
             check_trim(trim)
-        await self.link.call("TRIM_WRITE", (), rows)
+        if self.info.tells_sd:
+            for first in range(0, len(rows), ROWS_MOST):
+                await self.link.call("CALIBRATION_WRITE", (first,), rows[first : first + ROWS_MOST])
+        else:
+            await self.link.call("TRIM_WRITE", (), trim.short_rows(self.info.bubbles))
         if save:
             await self.save()
 

@@ -40,7 +40,7 @@ def watch(skin: Skin, title: str, heights_mm: NDArray[np.float64], report: Calla
         report(state, since)
         if since >= SECONDS:
             break
-    if not states[-1].settled:
+    if not states[-1].arrived:
         raise DeviceFault(
             f"The {title} does not stand after {SECONDS:g} s. Run `bubbleskin info` and look at supply pressure and faults."
         )

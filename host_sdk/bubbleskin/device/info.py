@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Self
 
+from bubble_protocol.schema.system import CAN_ESTIMATE
 from bubbleskin.link.message import SCHEMA_CRC, Message
 
 
@@ -23,6 +24,8 @@ class Info:
     height_max_mm: float
     pressure_max_kpa: float
     tables_crc: int
+    tells_sd: bool = False
+    """Whether it knows how well it knows a height, and the figures of each valve."""
 
     def __repr__(self) -> str:
         return (
@@ -45,4 +48,5 @@ class Info:
             height_max_mm=hello["height_max_um"] / 1000,
             pressure_max_kpa=hello["pressure_max_pa"] / 1000,
             tables_crc=hello["tables_crc"],
+            tells_sd=bool(hello["capabilities"] & CAN_ESTIMATE),
         )

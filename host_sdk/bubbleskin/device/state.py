@@ -45,13 +45,15 @@ class State:
     mode: str
     """idle, active, holding, boot, venting, faulted or stopped: see docs/safety.md."""
     height_mm: NDArray[np.float64]
-    """The firmware's estimate."""
+    """The firmware's estimate: each bubble by itself."""
     pressure_kpa: NDArray[np.float64]
     """Gauge, at the sensor."""
     target_mm: NDArray[np.float64]
     status: tuple[str, ...]
-    """resting, moving, settled, stopped or fault."""
+    """resting, moving, settled, unsure, stopped or fault. Unsure is at its target as far as is known, which is not far enough."""
     faults: tuple[tuple[str, ...], ...]
+    sd_mm: NDArray[np.float64] | None = None
+    """Standard deviation of the estimate; None where the firmware is too old to know or telemetry was not asked for it."""
     # Only telemetry with chosen fields has these; elsewhere they are None or NaN.
     setpoint_mm: NDArray[np.float64] | None = None
     """Where the way to the target stands."""
@@ -70,12 +72,12 @@ class State:
         if len(self.height_mm) <= _LISTED:
             heights = ", ".join(f"{height:.2f}" for height in self.height_mm)
         ill = [f"bubble {bubble}: {', '.join(faults)}" for bubble, faults in enumerate(self.faults) if faults]
-        doing = "; ".join(ill) or ("settled" if self.settled else "not settled")
+        doing = "; ".join(ill) or ("settled" if self.settled else "unsure" if self.arrived else "not settled")
         return f"<State at {self.time:.3f} s: {self.mode}, {heights} mm, {doing}>"
 
     @classmethod
     def of(cls, message: Message, tick: float, lost: int = 0) -> Self:
-        """From the reply to STATE, or from TELEMETRY."""
+        """From the reply to STATE or ESTIMATE, or from TELEMETRY."""
         columns = message.columns
         return cls(
             time=message["ticks"] * tick,
@@ -85,12 +87,13 @@ class State:
             target_mm=columns["target_um"] / 1000,
             status=tuple(status_name(status) for status in columns["status"].tolist()),
             faults=tuple(fault_names(faults) for faults in columns["faults"].tolist()),
+            sd_mm=columns["sd_um"] / 1000 if "sd_um" in columns else None,
             lost=lost,
         )
 
     @property
     def unsettled(self) -> list[int]:
-        """The bubbles that are not where they were asked to be: settled there, or empty because that is what was asked.
+        """The bubbles that are not where they were asked to be, as far as is known, or empty because that is what was asked.
 
         A bubble also rests while it empties, and at the beginning of a ramp from rest.
         """
@@ -98,10 +101,15 @@ class State:
         return [
             bubble
             for bubble, status in enumerate(self.status)
-            if not (status == "settled" or (status == "resting" and empty[bubble]))
+            if not (status in ("settled", "unsure") or (status == "resting" and empty[bubble]))
         ]
 
     @property
-    def settled(self) -> bool:
-        """Whether every bubble is where it was asked to be."""
+    def arrived(self) -> bool:
+        """Whether every bubble is where it was asked to be, as far as is known."""
         return not self.unsettled
+
+    @property
+    def settled(self) -> bool:
+        """Whether every bubble is where it was asked to be, and that is known well enough: none is unsure."""
+        return self.arrived and "unsure" not in self.status

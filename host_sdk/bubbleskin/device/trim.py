@@ -1,30 +1,59 @@
-"""What sets each bubble apart besides its table: the reply to TRIM_READ, and what TRIM_WRITE takes."""
+"""What sets each bubble apart besides its table: the replies to CALIBRATION_READ, and what CALIBRATION_WRITE takes."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bubble_protocol import codec, frame
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.message import Message
 
 APART_MOST = 1.3
 """Of one restrictor's flow to the middle one's: a bore of 0.2 mm that is 0.02 mm off makes 1.2."""
 
+_Integers = NDArray[np.int64]
+
+_WIRE = codec.BY_NAME["CALIBRATION_WRITE"]
+ROWS_MOST = (frame.PAYLOAD_MAX - _WIRE.fixed_size) // _WIRE.stride
+"""How many bubbles one message has room for."""
+_SHORT = ("zero", "opens_us", "closes_us", "flow_gain")  # what older firmware knows: both valves alike
+_NAMES = {  # of the wire's fields
+    "fill_opens_us": "opens_us",
+    "fill_closes_us": "closes_us",
+    "fill_gain": "flow_gain",
+    "vent_gain": "vent_flow_gain",
+}
+_UNKNOWN = {"flow_sd": 3900, "curve_sd": 6554, "leak": 0}  # 6 %, 10 %, none
+
 
 @dataclass(frozen=True, eq=False)
 class Trim:
-    """What sets each bubble apart besides its table, (n,) each, whole numbers as the firmware has them."""
+    """What sets each bubble apart besides its table, (n,) each, whole numbers as the firmware has them.
 
-    zero: NDArray[np.int64]
+    What is None is as of the fill valve, or as of a bubble that has not been calibrated.
+    """
+
+    zero: _Integers
     """Sensor counts without pressure."""
-    opens_us: NDArray[np.int64]
-    """From current to an open valve, µs."""
-    closes_us: NDArray[np.int64]
-    """From no current to a closed valve, µs."""
-    flow_gain: NDArray[np.int64]
-    """Flow of the restrictor: root of pressures (8 Pa) to µJ/ms, /65536."""
+    opens_us: _Integers
+    """Of the fill valve, from current to open, µs."""
+    closes_us: _Integers
+    """From no current to closed, µs."""
+    flow_gain: _Integers
+    """Flow of its restrictor: root of pressures (8 Pa) to µJ/ms, /65536."""
+    vent_opens_us: _Integers | None = None
+    """The same of the vent valve."""
+    vent_closes_us: _Integers | None = None
+    vent_flow_gain: _Integers | None = None
+    flow_sd: _Integers | None = None
+    """Standard deviation of both flows, a share, /65536."""
+    curve_sd: _Integers | None = None
+    """Standard deviation of the table's pressures, the memory of the rubber included, a share, /65536."""
+    leak: _Integers | None = None
+    """Air that the bubble loses, µJ/s for each kPa, /16: 845 is 1 % of the air in a bubble of 12 mm in a second."""
 
     def __repr__(self) -> str:
         return (
@@ -33,15 +62,26 @@ class Trim:
         )
 
     @classmethod
-    def of(cls, reply: Message) -> Self:
-        """From the reply to TRIM_READ."""
-        return cls(**reply.columns)
+    def of(cls, replies: Sequence[Message]) -> Self:
+        """From the replies to CALIBRATION_READ, or from the one to TRIM_READ."""
+        names = replies[0].columns
+        return cls(**{_NAMES.get(name, name): np.concatenate([r.columns[name] for r in replies]) for name in names})
 
     def rows(self, bubbles: int) -> list[tuple[int, ...]]:
-        """One row per bubble, as the wire wants them; `InvalidInput` where that cannot be."""
+        """One row per bubble, as CALIBRATION_WRITE wants them; `InvalidInput` where that cannot be."""
+        return self._rows(bubbles, tuple(field.name for field in fields(self)))
+
+    def short_rows(self, bubbles: int) -> list[tuple[int, ...]]:
+        """One row per bubble, as TRIM_WRITE wants them: what sets its valves apart from each other is left out."""
+        return self._rows(bubbles, _SHORT)
+
+    def _rows(self, bubbles: int, names: Sequence[str]) -> list[tuple[int, ...]]:
         rows = []
-        for name in ("zero", "opens_us", "closes_us", "flow_gain"):
-            values = np.asarray(getattr(self, name))
+        for name in names:
+            values = getattr(self, name)
+            if values is None:
+                values = np.full(bubbles, _UNKNOWN[name]) if name in _UNKNOWN else getattr(self, name[len("vent_") :])
+            values = np.asarray(values)
             if values.shape != (bubbles,):
                 raise InvalidInput(
                     f"{name} has the shape {values.shape}; give one number for each of {bubbles} bubbles."
@@ -56,17 +96,23 @@ class Trim:
 
 def check(trim: Trim) -> None:
     """`InvalidInput` where the trims of bubbles contradict each other; the device compares each with its board's file."""
-    flow = np.maximum(trim.flow_gain, 1)  # the device refuses none
+    for name in ("flow_gain", "vent_flow_gain"):
+        if (values := getattr(trim, name)) is not None:
+            _check_flows(name, values)
+
+
+def _check_flows(name: str, values: _Integers) -> None:
+    flow = np.maximum(values, 1)  # the device refuses none
     middle = float(np.median(flow))
     apart = np.maximum(flow / middle, middle / flow)
     bubble = int(apart.argmax())
     if apart[bubble] > APART_MOST:
         raise InvalidInput(
-            f"flow_gain of bubble {bubble} is {trim.flow_gain[bubble]} and the middle one is {middle:g}: those of a board are "
+            f"{name} of bubble {bubble} is {values[bubble]} and the middle one is {middle:g}: those of a board are "
             f"within a factor of {APART_MOST:g}. Look for dirt in the valve and measure again; anyway=True uploads it."
         )
 
 
-def _range(values: NDArray[np.int64]) -> str:
+def _range(values: _Integers) -> str:
     low, high = np.min(values), np.max(values)
     return f"{low}" if low == high else f"{low} to {high}"

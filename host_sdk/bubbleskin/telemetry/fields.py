@@ -13,6 +13,8 @@ from bubbleskin.link.message import Message
 
 NAMES = tuple(name for _, name, _, _, _ in telemetry.COLUMNS)
 """What can be chosen."""
+USUAL = ("height", "pressure", "target", "status", "faults", "sd")
+"""What comes where nothing was chosen."""
 
 
 def most(bubbles: int) -> int:
@@ -49,6 +51,7 @@ def state(message: Message, tick: float, bubbles: int, lost: int = 0) -> State:
         target_mm=thousandths.get("target", nothing),
         status=tuple(status_name(number) for number in columns.get("status", np.full(bubbles, -1)).tolist()),
         faults=tuple(fault_names(bits) for bits in columns.get("faults", np.zeros(bubbles, int)).tolist()),
+        sd_mm=thousandths.get("sd"),
         setpoint_mm=thousandths.get("setpoint"),
         fill_ms=thousandths.get("fill"),
         vent_ms=thousandths.get("vent"),

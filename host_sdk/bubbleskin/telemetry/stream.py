@@ -12,7 +12,7 @@ from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import Link
 from bubbleskin.link.message import Message
-from bubbleskin.telemetry.fields import mask, state
+from bubbleskin.telemetry.fields import USUAL, mask, most, state
 from bubbleskin.telemetry.recording import Recording, Table
 
 
@@ -105,6 +105,8 @@ class Telemetry:
                 f"rate_hz is {rate_hz}; telemetry comes more than 0 and up to {highest:g} times a second."
             )
         period = max(1, round(highest / rate_hz))
+        if fields is None and self._info.tells_sd and most(self._info.bubbles) >= len(USUAL):
+            fields = USUAL
         if fields is None:
             return ("SUBSCRIBE", (period,)), period
         return ("SUBSCRIBE_FIELDS", (period, mask(fields, self._info.bubbles))), period
