@@ -111,7 +111,7 @@ def test_the_name_of_one_of_ours_is_taken(pad8):
 
 
 def test_a_change_of_the_file_is_seen_at_once(pad8):
-    assert boards.load(pad8).DEADBAND_UM == 60
+    assert boards.load(pad8).DEADBAND_UM == 30
     text = pad8.read_text(encoding="utf-8")
     for number in (61, 62, 63):  # as long as each other, within a second
         pad8.write_text(f"{text}DEADBAND_UM = {number}\n", encoding="utf-8")

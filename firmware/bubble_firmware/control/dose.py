@@ -107,7 +107,7 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                 row[_STATUS] = _RESTING
                 isolated = 1
             if isolated:
-                row[_QUIESCENT] = 1 if vented == tick and row[_RAMPING] == 0 else 0
+                row[_QUIESCENT] = 1 if vented == tick and row[_RAMPING] == 0 and row[_EMPTY_TICKS] else 0
                 row[_SETTLING_US] = 0
                 row[_PREVIOUS_SETPOINT_AIR] = row[_AIR]
                 row[_ERROR] = 0
@@ -163,8 +163,9 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                     shortest = board[_PULSE_MIN_US]
                     if width > tick - shortest:  # too short a gap to close in
                         width = tick if width > tick - (shortest >> 1) else tick - shortest
-                    elif opened == 0 and width < shortest:  # of open time, half of that or more is worth a pulse
-                        width = shortest if 2 * (width - delay) >= shortest - delay else 0
+                    elif opened == 0 and width < shortest:
+                        # Of open time, five eighths of that or more are worth a pulse: with half, one may call for its opposite.
+                        width = shortest if 8 * (width - delay) >= 5 * (shortest - delay) else 0
                     if width < 0:
                         width = 0
                     if want > 0:

@@ -87,8 +87,8 @@ _ABSENT = const(65535)
 # [end of constants]
 
 _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps every product of control within 32 bits
-_EMPTY_PA = const(300)  # a line that has no more for a while is empty: the best reference there is
-_EMPTY_US = const(100000)
+_EMPTY_PA = const(1000)  # a line that has no more for a while is empty: the best reference there is
+_EMPTY_US = const(15000)
 _AIR_SD_EMPTY = const(200)  # µJ
 _AIR_SD_MAX = const(60000)
 _FAR_PA = const(10000)

@@ -450,7 +450,7 @@ MESSAGES = (
         "SUBSCRIBE_FIELDS",
         (
             ("period_ticks", U16, "ticks", 0, 60000, "one TELEMETRY_FIELDS every so many ticks; 0: none"),
-            ("fields", U16, "", 1, 255, "see telemetry columns, bits; as many as a frame has room for"),
+            ("fields", U16, "", 1, 511, "see telemetry columns, bits; as many as a frame has room for"),
         ),
         (),
         "send chosen telemetry in place of what was subscribed to before",
