@@ -166,6 +166,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             row[_READINGS] = 0
             row[_READINGS_SUM] = 0
         row[_DUE] = due
+        row[_AIR_METERED] = 0
 
         if due:
             # Air: what each valve has brought in the period that ended, and what it brings in the one that begins.
@@ -222,17 +223,17 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                             moved = 0 - moved
                         row[_AIR_SD] = row[_AIR_SD] + (moved * row[_FLOW_SD] >> 16) + (10 if energised == 0 else 0)
                 valve += 1
-            row[_AIR_METERED] = metered
             row[_AIR_IN_FLIGHT] = in_flight
-            air = row[_AIR] + metered
             if row[_LEAK_RATE]:
                 # Pa/16 times µJ/s per kPa *16, ticks: µJ/s/1000 ticks.
                 leaked = row[_LEAKED] + (pressure >> 4) * row[_LEAK_RATE] * (board[_TICK] - row[_LEAK_TICK])
                 lost = leaked // board[_LEAK_SHARE]
                 row[_LEAKED] = leaked - lost * board[_LEAK_SHARE]
-                air -= lost
+                metered -= lost
                 row[_AIR_SD] = row[_AIR_SD] + (lost >> 4)
             row[_LEAK_TICK] = board[_TICK]
+            row[_AIR_METERED] = metered
+            air = row[_AIR] + metered
             segment = row[_HEIGHT_SEGMENT]
 
             # Without pressure it is empty.
