@@ -45,7 +45,7 @@ def test_the_air_of_a_table_is_the_boards_and_no_upload_raises_it(rig):
 @pytest.mark.parametrize("share", [0.25, 0.7, 1.4, 4.0])
 def test_a_flow_that_no_restrictor_of_the_board_has_is_refused(rig, share):
     trim = rig.app.trim
-    rows = [tuple(trim.nominal)] * rig.board.BUBBLES
+    rows = [tuple(trim.nominal[:4])] * rig.board.BUBBLES
     rows[-1] = (*trim.nominal[:3], round(trim.nominal[3] * share))
     error, field, element, asked, low, high = rig.refused("TRIM_WRITE", (), rows)
     assert (error, field, element, asked) == (errors.OUT_OF_RANGE, 3, rig.board.BUBBLES - 1, rows[-1][3])
@@ -67,7 +67,8 @@ def test_no_accepted_upload_makes_a_bubble_higher_than_its_pressure_limit_does(t
         for knot, (height, pressure) in enumerate(table):
             app.tables.write_knot(bubble, knot, height, pressure)
         app.bubbles.set_trim(bubble, 0, app.trim.high[0] if zero else data.SENSOR_ZERO)
-        app.bubbles.set_trim(bubble, 3, (app.trim.nominal, app.trim.low, app.trim.high)[gain][3])
+        for place in (3, 6):
+            app.bubbles.set_trim(bubble, place, (app.trim.nominal, app.trim.low, app.trim.high)[gain][place])
     assert app.tables.first_flaw(data) < 0
     app.tables.swap()
     app.bubbles.use_tables()

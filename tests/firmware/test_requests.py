@@ -241,11 +241,11 @@ def test_the_columns_of_telemetry_are_of_the_row_they_name(rig7):
 @pytest.mark.usefixtures("unchanged")
 def test_more_columns_than_a_frame_has_room_for_are_refused(rig):
     assert rig.refused("SUBSCRIBE_FIELDS", (4, 0))[:2] == (errors.OUT_OF_RANGE, 1)
-    assert rig.refused("SUBSCRIBE_FIELDS", (4, 256))[:2] == (errors.OUT_OF_RANGE, 1)
+    assert rig.refused("SUBSCRIBE_FIELDS", (4, 512))[:2] == (errors.OUT_OF_RANGE, 1)
     if rig.board.BUBBLES == 19:
         assert rig.refused("SUBSCRIBE_FIELDS", (4, 127))[:4] == (errors.OUT_OF_RANGE, 1, WHOLE, 127)
     else:
-        assert rig.ask("SUBSCRIBE_FIELDS", (0, 255)).id == messages.SUBSCRIBE_FIELDS | messages.REPLY
+        assert rig.ask("SUBSCRIBE_FIELDS", (0, 511)).id == messages.SUBSCRIBE_FIELDS | messages.REPLY
 
 
 def test_ticks_begin_again_before_they_would_allocate(rig7):

@@ -71,7 +71,7 @@ class Device:
                 height = 4000 + 10000 * knot // (size - 1)
                 self.tables.write_knot(bubble, knot, height, (number * 7 + bubble + knot) % 40000)
         self.tables.swap()
-        self.trim.use(array("i", [160 + number % 80, 1000 + number % 999, 999, 4000] * n))
+        self.trim.use(array("i", [160 + number % 80, *(1000 + number % 999, 999, 4000) * 2, 100, number, 16] * n))
         self.settings.values[:] = array("i", [number, 1000 + number, -number])
         return self.content
 

@@ -38,7 +38,7 @@ def test_what_is_written_is_what_struct_and_zlib_make(kit):
 def test_a_record_of_full_tables_has_the_size_of_the_page_on_it(kit, name):
     device = kit.Device(NorFlash(), kit.board(name))
     assert device.store.save()
-    assert device.store.length == PRICE[name] + 4 * device.settings.count
+    assert device.store.length == PRICE[name] + 4 * device.settings.count + 12 * device.board.BUBBLES
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_what_the_board_does_not_allow_is_not_used(kit):
         *(((table,), trim, settings) for table in (high, short, falling, "00000000")),
         *((tables, (zero, *trim[1:]), settings) for zero in (160 + 89, 160 - 89)),
         (tables, (trim[0], 2501, *trim[2:]), settings),
-        (tables, (*trim[:3], 3984 * 4 + 1), settings),
+        (tables, (*trim[:3], 3984 * 4 + 1, *trim[4:]), settings),
         (tables, trim, (-1, *settings[1:])),
     ):
         newer = kit.make_record(kit.sections_of(unfit).values(), 2)
