@@ -118,7 +118,7 @@ def test_roots_are_those_of_iso_6358(critical):
     b = critical / 256
     table = array("i", bytes(8 * (layout.ROOT_STEPS + 1)))
     flow.fill_roots(table, 0, critical)
-    flow.vent_roots(table, layout.ROOT_STEPS + 1, critical, ATMOSPHERE)
+    flow.vent_roots(table, layout.ROOT_STEPS + 1, critical, int(ATMOSPHERE))
     filling, venting = np.array(table).reshape(2, layout.ROOT_STEPS + 1)
 
     def root(p1, p2):

@@ -75,9 +75,9 @@ _ATMOSPHERE_PA = const(23)
 _SURE_UM = const(24)
 _REZERO_UM = const(25)
 _LEAK_SHARE = const(26)
-_ROOTS = const(28)
+_ROOTS = const(27)
 _ROOT_STEPS = const(64)
-_ROWS = const(158)
+_ROWS = const(157)
 _ATMOSPHERE = const(101325)
 # [end of constants]
 

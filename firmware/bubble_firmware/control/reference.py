@@ -41,7 +41,7 @@ _BUBBLE_COUNT = const(0)
 _TICK = const(19)
 _SECOND = const(22)
 _ATMOSPHERE_PA = const(23)
-_ROWS = const(158)
+_ROWS = const(157)
 # [end of constants]
 
 _DWELL_UM = const(100)  # a bubble that has moved further dwells somewhere else

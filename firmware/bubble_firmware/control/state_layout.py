@@ -113,12 +113,12 @@ ATMOSPHERE_PA = const(23)
 SURE_UM = const(24)  # standard deviation up to which a height is known
 REZERO_UM = const(25)  # from which a bubble is emptied before it goes elsewhere; 0: never
 LEAK_SHARE = const(26)  # of the leak's reckoning in a µJ
-BOARD_WORDS = const(28)
+BOARD_WORDS = const(27)
 
 # The tables of roots, see `flow`; then the rows; after them the curves.
-ROOTS = const(28)
+ROOTS = const(27)
 ROOT_STEPS = const(64)  # in each of the two tables
-ROWS = const(158)
+ROWS = const(157)
 
 ATMOSPHERE = const(101325)  # Pa
 READINGS_MIN = const(2)  # in a row that make a fault: one alone is noise

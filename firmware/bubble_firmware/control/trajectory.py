@@ -37,7 +37,7 @@ _RAMP_DONE = const(16)
 _RAMP_TICKS = const(17)
 _RAMP_SHARE = const(18)
 _ATMOSPHERE_PA = const(23)
-_ROWS = const(158)
+_ROWS = const(157)
 _LEAVE = const(65535)
 # [end of constants]
 

@@ -81,9 +81,16 @@ FIELDS = (
     Field("GAIN_D", "1/256", _to(0, 1024), "of its change"),
     Field("DEADBAND_UM", "µm", _to(1, 1000), "no dose for less"),
     Field("SETTLED_UM", "µm", _to(1, 1000), "a bubble this near its target counts as there"),
-    Field("SURE_UM", "µm", _to(1, 1000), "and as settled where its height is known as well as that: a standard deviation"),
+    Field(
+        "SURE_UM", "µm", _to(1, 1000), "and as settled where its height is known as well as that: a standard deviation"
+    ),
     Field("FLOW_SD", "/65536", _to(1, 16384), "how far restrictors are from CONDUCTANCE: standard deviation, a share"),
-    Field("CURVE_SD", "/65536", _to(1, 16384), "how far pressures are from the table's, the rubber's memory included: a share"),
+    Field(
+        "CURVE_SD",
+        "/65536",
+        _to(1, 16384),
+        "how far pressures are from the table's, the rubber's memory included: a share",
+    ),
     # The chip.
     Field("PIN_PUMP", "GPIO", (14,), "pump, the PWM of slice 7"),
     Field("PIN_DUMP", "GPIO", GPIOS, "dump valve"),

@@ -546,7 +546,7 @@ MESSAGES = (
         ESTIMATE | REPLY,
         "ESTIMATE_REPLY",
         (_TICKS, ("mode", U8, "", None, None, "see mode")),
-        _BUBBLES + (("sd_um", U16, "µm", None, None, "standard deviation of the estimated height"),),  # noqa: RUF005 - MicroPython
+        _BUBBLES + (("sd_um", U16, "µm", None, None, "standard deviation of the estimated height"),),
         "the state of every bubble, and how well it is known",
     ),
     (
