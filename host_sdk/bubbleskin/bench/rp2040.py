@@ -131,16 +131,16 @@ def control_rows(board: str, size: float = 1.0) -> Iterator[Row]:
 
 
 def curves(board: str) -> list[list[tuple[float, int, int]]]:
-    """The curves of every bubble by the tables of `board`: knots of (height µm, air µJ, pressure Pa)."""
+    """The curves of every bubble by the tables of `board`: knots of (height µm, volume mm³, pressure Pa)."""
     data = boards.load(board)
     bubbles = Bubbles(data, Tables(data.BUBBLES))
     found = []
     for i in range(data.BUBBLES):
         first, last = (bubbles.rows[i * layout.ROW_WORDS + edge] // 4 for edge in _EDGES)
         knots = range(first, last + 2 * layout.KNOT_WORDS, layout.KNOT_WORDS)
-        places = (layout.KNOT_HEIGHT, layout.KNOT_AIR, layout.KNOT_PRESSURE)
-        heights, air, pressures = ([bubbles.curves[knot + place] for knot in knots] for place in places)
-        found.append([(h / 16, a, p) for h, a, p in zip(heights, air, pressures, strict=True)])
+        places = (layout.KNOT_HEIGHT, layout.KNOT_VOLUME, layout.KNOT_PRESSURE)
+        heights, volumes, pressures = ([bubbles.curves[knot + place] for knot in knots] for place in places)
+        found.append([(h / 16, v / 64, p) for h, v, p in zip(heights, volumes, pressures, strict=True)])
     return found
 
 
