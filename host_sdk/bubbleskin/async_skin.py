@@ -3,7 +3,7 @@
 import os
 from collections.abc import AsyncGenerator, Iterable, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self, overload
+from typing import TYPE_CHECKING, Literal, NoReturn, Self, overload
 
 import numpy as np
 
@@ -305,6 +305,9 @@ class AsyncSkin:
             await self._telemetry.aclose()
         finally:
             await self.link.close()
+
+    def __reduce__(self) -> NoReturn:
+        raise InvalidInput("A skin cannot be sent to another process or copied; connect in that process.")
 
     def __repr__(self) -> str:
         return describe("AsyncSkin", self.link, self.info)

@@ -3,7 +3,7 @@
 import os
 from collections.abc import AsyncGenerator, Iterable, Iterator, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self, overload
+from typing import TYPE_CHECKING, Literal, NoReturn, Self, overload
 
 from bubbleskin.async_skin import AsyncSkin, describe
 from bubbleskin.device.faults import Fault
@@ -13,6 +13,7 @@ from bubbleskin.device.settings import Setting
 from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
 from bubbleskin.device.trim import Trim
+from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link, run_sync
@@ -270,6 +271,9 @@ class Skin:
     def close(self) -> None:
         """Let go of the device. Without a host it holds what moves after 250 ms and vents after 1 s, see `settings`."""
         run_sync(self._skin.aclose())
+
+    def __reduce__(self) -> NoReturn:
+        raise InvalidInput("A skin cannot be sent to another process or copied; connect in that process.")
 
     def __repr__(self) -> str:
         return describe("Skin", self.link, self.info)

@@ -4,7 +4,10 @@ import asyncio
 import contextlib
 import logging
 import math
+import os
 import threading
+import warnings
+import weakref
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
@@ -78,6 +81,16 @@ class Link(Serviced):
         self._sent_at = 0.0
         self._opening = asyncio.Lock()
         self._keeper: Keeper | None = None
+        self._process = os.getpid()
+        self._left_behind = False  # whether this is a copy, in a fork of the process that opened it
+        _here.add(self)
+
+    def __del__(self) -> None:
+        if getattr(self, "open", False) and not self._left_behind:
+            what = f"{self.transport.name} was not closed: use `with bubbleskin.connect(…) as skin`, or `skin.close()`."
+            warnings.warn(what, ResourceWarning, source=self, stacklevel=2)
+            with contextlib.suppress(Exception):
+                self.transport.close()
 
     @property
     def session(self) -> int:
@@ -88,6 +101,7 @@ class Link(Serviced):
 
     async def hello(self) -> Message:
         """Open a session. `WrongDevice` where there is no wristband, or one we cannot talk to."""
+        self._check_process()
         with self.guard:
             try:
                 return await self._open(self.transport.now() + self.timeout)
@@ -111,6 +125,7 @@ class Link(Serviced):
         whether the request may have been applied. `DeviceRestarted` where the device has forgotten everything.
         Where several have failed, the first one's error is raised.
         """
+        self._check_process()
         with self.guard:
             patience = self.timeout if timeout is None else timeout
             deadline = self.transport.now() + patience
@@ -143,6 +158,7 @@ class Link(Serviced):
 
     async def wait(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
         """Take what comes until `done()`, or the transport's clock stands at `until`, s; keep the link alive meanwhile."""
+        self._check_process()
         with self.guard:
             while not done() and (now := self.transport.now()) < until:
                 self._service(now)
@@ -152,6 +168,8 @@ class Link(Serviced):
         """Let go of the transport."""
         self.closed = True
         self.open = False
+        if self._left_behind:
+            return
         self._line.keep = False
         try:
             if self._keeper:
@@ -160,6 +178,20 @@ class Link(Serviced):
         finally:
             with self.guard:
                 self.transport.close()
+
+    def leave_behind(self) -> None:
+        """This is a copy in a forked process: what it holds of the port is let go of, and every call is refused.
+
+        The session, its numbers and the lock of another thread are copies too: one request from here would make the
+        wristband take the next one of the process that opened the port for a duplicate.
+        """
+        self._left_behind = True
+        self.transport.leave_behind()
+
+    def _check_process(self) -> None:
+        """`LinkError` in a process that was forked from the one that opened this; before the lock, which may be another's."""
+        if self._left_behind:
+            raise errors.other_process(self.transport.name, self._process, os.getpid())
 
     def _outcome(self, request: Request) -> Message:
         if request.error:
@@ -354,6 +386,19 @@ class Link(Serviced):
             self._rtt.update(now - sent_at)
             if self.on_ping:
                 self.on_ping(sent_at, message, now)
+
+
+_here: "weakref.WeakSet[Link]" = weakref.WeakSet()
+"""The links of this process."""
+
+
+def _leave_all_behind() -> None:
+    for link in tuple(_here):
+        link.leave_behind()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_leave_all_behind)
 
 
 def _all_done(left: list[Request]) -> bool:
