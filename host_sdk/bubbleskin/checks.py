@@ -25,6 +25,8 @@ _NO_NUMBERS = {
 }
 """Kinds of numpy's arrays that would become numbers without anybody noticing what got lost."""
 _SHOWN = 60
+_MOST = 10_000_000
+"""Entries that are taken at all: of a heightfield 3000 by 3000, of measurements days."""
 _PLACES = 5
 
 
@@ -39,6 +41,7 @@ def shown(value: Any) -> str:
 
 def array(name: str, value: Any) -> NDArray[np.float64]:
     """``value`` as a float array of real numbers; nan and inf pass. Masked entries are refused by their places."""
+    _refuse_more(name, value)
     if isinstance(value, np.ma.MaskedArray):
         refuse_places(name, "masked", np.ma.getmaskarray(value))
         value = np.ma.getdata(value)
@@ -55,9 +58,25 @@ def array(name: str, value: Any) -> NDArray[np.float64]:
     except OverflowError:
         raise InvalidInput(f"{name} is {shown(value)}, which is beyond every number that can be meant.") from None
     except Exception as error:  # a tensor on another machine, a nested list with a gap: each library raises its own
-        why = f" ({' '.join(str(error).split())[:120].rstrip('.')})" if not isinstance(error, TypeError) else ""
+        why = "" if isinstance(error, TypeError) else f" ({_reason(error)})"
         raise InvalidInput(f"{name} must be a number or an array of numbers, not {shown(value)}{why}.") from None
     raise InvalidInput(f"{name} must be a number or an array of numbers, not {no_numbers}: {shown(value)}.")
+
+
+def _refuse_more(name: str, value: Any) -> None:
+    """Refuse more entries than anything here can mean, before they take memory."""
+    try:
+        count = len(value)
+    except Exception:
+        return
+    if count > _MOST:
+        raise InvalidInput(f"{name} has {count} entries; {_MOST} at most can be meant.")
+
+
+def _reason(error: Exception) -> str:
+    """Why a library could not make an array, in few words."""
+    said = " ".join(str(error).split())
+    return "its rows differ in length" if "inhomogeneous" in said else said[:_SHOWN].rstrip(".")
 
 
 def _real(value: Any) -> float:
@@ -117,7 +136,9 @@ def above_zero(name: str, value: Any, high: float = math.inf, unit: str = "") ->
 def whole(name: str, value: Any, low: int, high: int, unit: str = "") -> int:
     """``value`` as one whole number from ``low`` to ``high``."""
     one = value if type(value) is int else None
-    if one is None and isinstance(value, np.integer) and not isinstance(value, bool):
+    if (
+        one is None and isinstance(value, np.integer) and not isinstance(value, np.timedelta64)
+    ):  # numpy counts it among them
         one = int(value)
     if one is None:
         real = number(name, value)
@@ -169,6 +190,7 @@ def several(name: str, value: Any, say: str) -> list[Any]:
     """The entries of ``value`` where it has some and is no text; ``say``: what to give instead."""
     if isinstance(value, str | bytes | dict) or not isinstance(value, Iterable):
         raise InvalidInput(f"{name} is {shown(value)}; give {say}.")
+    _refuse_more(name, value)
     return list(value)
 
 

@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bubbleskin import boards
+from bubbleskin.checks import above_zero, array, whole
 from bubbleskin.errors import InvalidInput
 
+RINGS_MAX = 50
+ROWS_MAX = 1000
 _SAME_MM = 1e-3  # in which devices tell where their bubbles are
 
 
@@ -28,13 +31,12 @@ class Layout:
     """Distance between the centres of neighbours."""
 
     def __post_init__(self) -> None:
-        positions = np.array(self.positions_mm, dtype=float)
+        positions = array("positions_mm", self.positions_mm)
         if positions.ndim != 2 or positions.shape[1] != 2 or not len(positions):
             raise InvalidInput(f"A layout needs an (n, 2) array of positions in mm; this one is {positions.shape}.")
         if not np.isfinite(positions).all():
             raise InvalidInput("A layout's positions must be finite numbers in mm; one is not.")
-        if not (np.isfinite(self.pitch_mm) and self.pitch_mm > 0):
-            raise InvalidInput(f"The pitch must be a positive number of mm; {self.pitch_mm} is not.")
+        object.__setattr__(self, "pitch_mm", above_zero("The pitch", self.pitch_mm, unit="mm"))
         positions.setflags(write=False)
         object.__setattr__(self, "positions_mm", positions)
 
@@ -58,8 +60,8 @@ class Layout:
 
         Bubble 0 is the centre; then ring by ring, each counterclockwise from the one on the right.
         """
-        if rings < 0:
-            raise InvalidInput(f"A hexagon has 0 or more rings; {rings} were asked.")
+        rings = whole("rings", rings, 0, RINGS_MAX)
+        pitch_mm = above_zero("pitch_mm", pitch_mm, unit="mm")
         corners = [np.array([np.cos(a), np.sin(a)]) for a in np.deg2rad(np.arange(0, 420, 60))]
         places = [np.zeros(2)]
         for ring in range(1, rings + 1):
@@ -70,8 +72,8 @@ class Layout:
     @classmethod
     def grid(cls, rows: int, columns: int, pitch_mm: float = 10.0) -> Self:
         """`rows` by `columns` bubbles around the origin; row by row from the lowest y, each from the left."""
-        if rows < 1 or columns < 1:
-            raise InvalidInput(f"A grid needs at least one row and one column; {rows} by {columns} were asked.")
+        rows, columns = whole("rows", rows, 1, ROWS_MAX), whole("columns", columns, 1, ROWS_MAX)
+        pitch_mm = above_zero("pitch_mm", pitch_mm, unit="mm")
         y, x = np.mgrid[0:rows, 0:columns].astype(float)
         places = np.column_stack([x.ravel() - (columns - 1) / 2, y.ravel() - (rows - 1) / 2])
         return cls(places * pitch_mm, pitch_mm)

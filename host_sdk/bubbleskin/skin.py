@@ -63,22 +63,31 @@ class Skin:
         return self._skin.simulated
 
     @overload
-    def show(self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True) -> State: ...
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True, *, fill: str | None = None
+    ) -> State: ...
     @overload
-    def show(self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False]) -> None: ...
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False], fill: str | None = None
+    ) -> None: ...
     @overload
-    def show(self, heights_mm: Heights, over: float, wait: Literal[False]) -> None: ...
+    def show(self, heights_mm: Heights, over: float, wait: Literal[False], *, fill: str | None = None) -> None: ...
     @overload
-    def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None: ...
-    def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+    ) -> State | None: ...
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+    ) -> State | None:
         """Take a shape.
 
         `heights_mm`: one height per bubble (n,), a 2-D heightfield stretched over the layout, or f(x_mm, y_mm).
         Heights from 0 to `info.height_max_mm`; up to `info.height_rest_mm` means no pressure. `over`: seconds
         the change should take, 0 as fast as the valves can. With `wait`, returns the state once every bubble
-        has settled and raises `DeviceFault` if one does not; otherwise returns None at once.
+        has settled and raises `DeviceFault` if one does not; otherwise returns None at once. `fill`: 'nearest' gives
+        entries of a heightfield that are masked or nan the number of the nearest one; without it they are refused.
         """
-        return run_sync(self._skin.show(heights_mm, over, wait))
+        return run_sync(self._skin.show(heights_mm, over, wait, fill=fill))
 
     def state(self) -> State:
         """Heights, pressures, targets and status of all bubbles, now."""
@@ -137,7 +146,8 @@ class Skin:
     ) -> PlaybackReport | None:
         """Play a sequence by the device's own clock; it takes over from whatever the bubbles did before.
 
-        `sequence`: a `Sequence`, something that has one (a `Plan`), or the path of a .json or .csv file. It is checked
+        `sequence`: a `Sequence`, something that has one (a `Plan`), the path of a .json or .csv file, or a name of the library
+        such as 'pulse'. It is checked
         against this device before a byte is sent, and again there. `at`: device time in s, as of `state().time`, at
         which to begin; None is now, and a time that has passed is refused. With `wait`, follows it to its end, tells
         `progress` of every step, and returns when each began; raises `DeviceFault` where it does not come to its end:

@@ -131,7 +131,7 @@ BAD_JSON = {
         {"bubbleskin_sequence": 1, "steps": [{**STEP, "until": {"after_s": 1, "then": "vent"}}]},
         r"steps\[0\].until has 'then'",
     ),
-    "no time": ({"bubbleskin_sequence": 1, "steps": [{"targets_mm": [6, 7]}]}, "must take time"),
+    "no time": ({"bubbleskin_sequence": 1, "steps": [{"targets_mm": None}]}, "only waits"),
     "counts": (
         {"bubbleskin_sequence": 1, "steps": [STEP, {"targets_mm": [6], "ramp_s": 1}]},
         "2 targets; the sequence is for 1 bubbles",

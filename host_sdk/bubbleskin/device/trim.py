@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin.checks import finite
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.message import Message
 
@@ -41,12 +42,12 @@ class Trim:
         """One row per bubble, as the wire wants them; `InvalidInput` where that cannot be."""
         rows = []
         for name in ("zero", "opens_us", "closes_us", "flow_gain"):
-            values = np.asarray(getattr(self, name))
+            values = finite(name, getattr(self, name))
             if values.shape != (bubbles,):
                 raise InvalidInput(
                     f"{name} has the shape {values.shape}; give one number for each of {bubbles} bubbles."
                 )
-            if not (np.isfinite(values).all() and (values == np.rint(values)).all()):
+            if not (values == np.rint(values)).all():
                 raise InvalidInput(f"{name} must be whole numbers; {values.tolist()} are not.")
             if (values < 0).any() or (values > 65535).any():
                 raise InvalidInput(f"{name} is {values.tolist()}; numbers from 0 to 65535 are allowed.")

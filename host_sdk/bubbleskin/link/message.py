@@ -61,9 +61,15 @@ def pack(name: str, sequence: int, fixed: Sequence[int], repeated: Sequence[Sequ
     struct_codec = BY_NAME[name]
     try:
         return struct_codec.pack(sequence, fixed, repeated)
-    except struct.error:  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
+    except (
+        struct.error,
+        TypeError,
+    ):  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
         message = struct_codec.message
-        given = list(chain(fixed, *repeated))
+        try:
+            given = list(chain(fixed, *repeated))
+        except TypeError:
+            raise InvalidInput(f"{name} takes rows of numbers, not {shown(repeated)}.") from None
         wanted = message.fixed_values + len(repeated) * message.stride_values
         if len(given) != wanted:
             raise InvalidInput(f"{name} takes {wanted} values, not {len(given)}.") from None

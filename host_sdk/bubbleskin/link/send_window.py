@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from bubble_protocol import codec
 from bubble_protocol.frame import NO_KEY
 from bubble_protocol.schema import messages, system
+from bubbleskin.checks import shown
 from bubbleskin.errors import BubbleskinError, InvalidInput, Overtaken
 from bubbleskin.link.framing import FRAME_CONTENT
 from bubbleskin.link.message import Message, numbered, pack
@@ -56,8 +57,8 @@ class Request:
     """Packed before it has a place or a number: what cannot be packed is refused, and nothing else hears of it."""
 
     def __post_init__(self) -> None:
-        if self.name not in codec.BY_NAME:
-            raise InvalidInput(f"There is no request {self.name!r}; they stand in the protocol's page.")
+        if not isinstance(self.name, str) or self.name not in codec.BY_NAME:
+            raise InvalidInput(f"There is no request {shown(self.name)}; they stand in the protocol's page.")
         self.id = codec.BY_NAME[self.name].id
         self.content = pack(self.name, 0, self.fixed, self.repeated)
         if len(self.content) > FRAME_CONTENT:

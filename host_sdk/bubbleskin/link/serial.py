@@ -146,7 +146,6 @@ class SerialTransport(Transport):
         if left:
             left.close()
 
-
     def leave_behind(self) -> None:
         """See `Transport`. A socket is closed, not shut down: that would end the connection of the first process."""
         left = getattr(self._port, "_socket", None)

@@ -34,6 +34,7 @@ class Transport(ABC):
 
     def leave_behind(self) -> None:
         """Let go of this process's copy after a fork, without the other end or the first process noticing."""
+        return  # a transport that holds no port has nothing to let go of
 
     @property
     def behind(self) -> float:

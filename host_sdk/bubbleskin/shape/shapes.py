@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin import checks
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 
@@ -15,20 +16,25 @@ LOW_MM, HIGH_MM = 5.5, 12.0
 
 def dome(layout: Layout) -> NDArray[np.float64]:
     """Highest in the middle, a sphere's cap falling to 6.5 mm at the outermost bubbles, (n,)."""
+    _check(layout)
     distance = np.linalg.norm(layout.positions_mm, axis=1)
     return HIGH_MM - 5.5 * (distance / max(distance.max(), 1e-9)) ** 2
 
 
 def plane(layout: Layout) -> NDArray[np.float64]:
     """Rising from 5.5 mm on the left to 12 mm on the right, (n,)."""
-    x = layout.positions_mm[:, 0]
+    x = _check(layout).positions_mm[:, 0]
     share = (x - x.min()) / max(np.ptp(x), 1e-9)
     return LOW_MM + (HIGH_MM - LOW_MM) * share
 
 
 def flat(layout: Layout) -> NDArray[np.float64]:
     """Every bubble at rest, without pressure, (n,)."""
-    return np.zeros(len(layout))
+    return np.zeros(len(_check(layout)))
+
+
+def _check(layout: Layout) -> Layout:
+    return checks.instance("layout", layout, Layout, "a Layout, such as skin.layout or Layout.hexagon()")
 
 
 SHAPES: dict[str, Callable[[Layout], NDArray[np.float64]]] = {"dome": dome, "plane": plane, "flat": flat}
