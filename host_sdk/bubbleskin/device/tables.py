@@ -34,13 +34,18 @@ def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) 
         if tables.board != info.board:
             raise InvalidInput(f"The calibration is of a {tables.board}; this is a {info.board}.")
         tables = tables.tables
-    each = list(tables) if isinstance(tables, Sequence) and not isinstance(tables, str) else [tables] * info.bubbles
+    several = isinstance(tables, Sequence) and not isinstance(tables, str)
+    each = (
+        list(tables[: info.bubbles + 1]) if several else [tables] * info.bubbles
+    )  # a table too many is enough to refuse
     for table in each:
         instance(
             "tables", table, Table, "a Table, one per bubble, or a Calibration; of a balloon: build_table(balloon)"
         )
     if len(each) != info.bubbles:
-        raise InvalidInput(f"{len(each)} tables for {info.bubbles} bubbles: give one per bubble, or one for all.")
+        raise InvalidInput(
+            f"{len(tables) if several else len(each)} tables for {info.bubbles} bubbles: give one per bubble, or one for all."
+        )
     return each
 
 

@@ -59,6 +59,8 @@ def encode(
 def pack(name: str, sequence: int, fixed: Sequence[int], repeated: Sequence[Sequence[int]]) -> bytes:
     """Id, sequence number and payload of one message. `InvalidInput` for values that no message can have."""
     struct_codec = BY_NAME[name]
+    if not (hasattr(fixed, "__len__") and hasattr(repeated, "__len__")) or len(repeated) > FRAME_MAX:
+        raise InvalidInput(f"{name} takes numbers and a few rows of them, not {shown(repeated)}.")
     try:
         return struct_codec.pack(sequence, fixed, repeated)
     except (
@@ -74,7 +76,7 @@ def pack(name: str, sequence: int, fixed: Sequence[int], repeated: Sequence[Sequ
         if len(given) != wanted:
             raise InvalidInput(f"{name} takes {wanted} values, not {len(given)}.") from None
         for value in given:
-            if isinstance(value, bool) or not isinstance(value, int | np.integer):
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or isinstance(value, np.timedelta64):
                 raise InvalidInput(f"{name} takes whole numbers; {shown(value)} is none.") from None
         values = array("i", map(signed_word, given))
         payload = bytearray(max(FRAME_MAX, 4 * wanted))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bubble_protocol import steps as limits
-from bubbleskin.checks import array, instance, shown, text
+from bubbleskin.checks import array, instance, number, shown, text
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.sequence import files
@@ -144,6 +144,7 @@ class Sequence:
         until settled are taken to be so at the end of their ramps.
         """
         times = np.atleast_1d(array("t", t))
+        rest_mm = number("rest_mm", rest_mm, 0.0, unit="mm")
         if not np.isfinite(times).all():
             raise InvalidInput("Moments must be finite numbers of seconds; one is not.")
         heights = np.empty((len(times), self.bubbles))
@@ -204,7 +205,8 @@ class Sequence:
     @classmethod
     def load(cls, path: str | Path) -> "Sequence":
         """From a .json or .csv file, whichever it is."""
-        return cls.from_csv(path) if Path(path).suffix.lower() == ".csv" else cls.from_json(Path(path))
+        where = files.path_of(path, "the sequence")
+        return cls.from_csv(where) if where.suffix.lower() in (".csv", ".tsv", ".txt") else cls.from_json(where)
 
 
 class HasSequence(Protocol):

@@ -61,7 +61,7 @@ def _field(heights_mm: Any, layout: Layout, fill: str | None) -> NDArray[np.floa
     """Heights that are no function, as they are or interpolated."""
     _say_how(heights_mm, layout)
     if fill and np.ndim(heights_mm) == 2:
-        heights_mm = _filled(heights_mm)
+        heights_mm = filled(heights_mm, fill)
     heights = checks.array("The array of heights", heights_mm)
     if heights.ndim != 2:
         return heights
@@ -107,8 +107,9 @@ def _guess(given: Any, heights: NDArray[np.float64], height_max_mm: float) -> st
     return ""
 
 
-def _filled(field: Any) -> NDArray[np.float64]:
+def filled(field: Any, fill: str) -> NDArray[np.float64]:
     """A heightfield with its masked entries and those that are nan as the nearest others, by distance in entries."""
+    checks.one_of("fill", fill, FILLS)
     from scipy.ndimage import distance_transform_edt
 
     unknown = (
