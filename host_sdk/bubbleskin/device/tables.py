@@ -34,17 +34,13 @@ def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) 
         if tables.board != info.board:
             raise InvalidInput(f"The calibration is of a {tables.board}; this is a {info.board}.")
         tables = tables.tables
-    several = isinstance(tables, Sequence) and not isinstance(tables, str)
-    each = (
-        list(tables[: info.bubbles + 1]) if several else [tables] * info.bubbles
-    )  # a table too many is enough to refuse
+    count = len(tables) if isinstance(tables, Sequence) and not isinstance(tables, str) else None
+    if count not in (None, info.bubbles):
+        raise InvalidInput(f"{count} tables for {info.bubbles} bubbles: give one per bubble, or one for all.")
+    each: list[Table] = [tables] * info.bubbles if count is None else list(tables)  # type: ignore[list-item, arg-type]
     for table in each:
         instance(
             "tables", table, Table, "a Table, one per bubble, or a Calibration; of a balloon: build_table(balloon)"
-        )
-    if len(each) != info.bubbles:
-        raise InvalidInput(
-            f"{len(tables) if several else len(each)} tables for {info.bubbles} bubbles: give one per bubble, or one for all."
         )
     return each
 

@@ -18,6 +18,7 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
+_AT_ONCE = 2**20
 _LOOKED_AT = 512
 _LATIN = "\u2260"
 """Beyond these letters and signs (µ, −, °) nothing of ours begins."""
@@ -38,7 +39,9 @@ def read_bytes(path: Any, what: str, most: int = BYTES_MAX) -> bytes:
     place = path_of(path, what)
     try:
         with place.open("rb") as file:
-            data = file.read(most + 1)
+            data = b""
+            while len(data) <= most and (part := file.read(_AT_ONCE)):
+                data += part
     except (OSError, ValueError) as error:  # the second: a name that no system can have
         raise InvalidInput(f"Cannot read {what} {_name(place)}: {_why(error)}.") from None
     if len(data) > most:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -50,11 +51,13 @@ def parse_heights(texts: Sequence[str]) -> NDArray[np.float64]:
     table = Grid("the command line", " ", [])
     heights = []
     for position, text in enumerate(texts, 1):
+        if re.match(r"--|-[a-z]", text, re.I):
+            raise InvalidInput(f"There is no option {checks.shown(text)}; see --help.")
         try:
             heights.append(table.number(Cell(text.strip(), 1, position)))
         except CellError as error:
             raise InvalidInput(
-                f"{checks.shown(text)}, for bubble {position - 1}, is not a height in mm: it {error}. Give numbers, one per bubble."
+                f"{checks.shown(text)}, for bubble {position - 1}, is no height in mm: it {error}. Give a number for each bubble."
             ) from None
     return np.array(heights)
 
