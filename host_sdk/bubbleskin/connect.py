@@ -36,7 +36,9 @@ def connect(url: str | os.PathLike[str] | None = None, *, timeout: float = 2.0, 
     """
     patience = _checked(timeout, layout)
     transport, board = open_transport(url)
-    return Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout)))
+    skin = Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout)))
+    skin.link.warns = True
+    return skin
 
 
 async def aconnect(
@@ -45,7 +47,9 @@ async def aconnect(
     """The same for asyncio: a skin whose methods are coroutines."""
     patience = _checked(timeout, layout)
     transport, board = open_transport(url)
-    return await AsyncSkin.open(transport, patience, event_loop=True, simulated=board, layout=layout)
+    skin = await AsyncSkin.open(transport, patience, event_loop=True, simulated=board, layout=layout)
+    skin.link.warns = True
+    return skin
 
 
 def open_transport(url: str | os.PathLike[str] | None) -> "tuple[Transport, Simulated | None]":

@@ -67,7 +67,7 @@ VERBS = {
     "upload_trim": lambda skin, a, b: skin.upload_trim(a),
     "inject": lambda skin, a, b: skin.simulated.inject("leak", a, b),
     "inject fault": lambda skin, a, b: skin.simulated.inject(a, 0),
-    "link": lambda skin, a, b: run_sync(skin.link.call("SHOW", (a,), b or ())),
+    "link": lambda skin, a, b: run_sync(skin.link.call("SHOW", (a,), () if b is None else b)),
     "link name": lambda skin, a, b: run_sync(skin.link.call(a)),
 }
 ASKS_FIRST = ("configure", "configure name", "upload_tables save")

@@ -81,13 +81,20 @@ def test_bytes_are_read_or_refused(kind, tmp_path_factory, data):
 
 
 TOKENS = [
-    b"nan", b"inf", b"1e999", b"9" * 400, b"9" * 5000, b'"', b"[" * 2000, b"{" * 2000, b"\0", b"\xff\xfe", b"\xef\xbb\xbf", b";", b"\t",
-    b",", b"\n", b"\r", b"-1", b"1_000", b"#", b"\\ud800", b"true", b"null", b"0x10", b"'", b"=", b"1979-05-27", b"\xc2\xb2", b"sep=;\n",
+    b"nan", b"inf", b"1e999", b"9" * 400, b"9" * 5000, b'"',
+    b"[" * 2000, b"{" * 2000, b"\0", b"\xff\xfe", b"\xef\xbb\xbf", b";", b"\t",
+    b",", b"\n", b"\r", b"-1", b"1_000", b"#", b"\\ud800",
+    b"true", b"null", b"0x10", b"'", b"=", b"1979-05-27", b"\xc2\xb2", b"sep=;\n",
     b"PK\x03\x04", b"\xfd7zXZ\0", b"\x1f\x8b", b"A" * 200_000,
 ]  # fmt: skip
 
 VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8) | st.sampled_from([10**400, "\ud800"]),
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.sampled_from([10**400, "\ud800"]),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
     max_leaves=12,
 )

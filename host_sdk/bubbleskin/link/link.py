@@ -4,10 +4,8 @@ import asyncio
 import contextlib
 import logging
 import math
-import os
 import threading
 import warnings
-import weakref
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
@@ -21,6 +19,7 @@ from bubbleskin.link.handshake import Handshake, is_accepted
 from bubbleskin.link.keepalive import KEEP_ALIVE, Keeper, Pings, Serviced, TaskKeeper, ThreadKeeper
 from bubbleskin.link.line import SLICE, Line
 from bubbleskin.link.message import Message, name_of
+from bubbleskin.link.process import Owner
 from bubbleskin.link.reader import Reader
 from bubbleskin.link.refusals import describe_refusal
 from bubbleskin.link.rtt import RttEstimator
@@ -66,6 +65,8 @@ class Link(Serviced):
         """A restart that was asked for is not told as one that was not."""
         self.closed = False
         self.open = False
+        self.warns = False
+        """Whether it says so when nobody holds it any more and nobody has closed it."""
         # Threads of a script take turns, and the one that keeps the link alive has its own between calls. Tasks need none.
         self.guard: Any = contextlib.nullcontext() if event_loop else threading.RLock()
         self._event_loop = event_loop
@@ -81,14 +82,13 @@ class Link(Serviced):
         self._sent_at = 0.0
         self._opening = asyncio.Lock()
         self._keeper: Keeper | None = None
-        self._process = os.getpid()
-        self._left_behind = False  # whether this is a copy, in a fork of the process that opened it
-        _here.add(self)
+        self._owner = Owner(transport)
 
     def __del__(self) -> None:
-        if getattr(self, "open", False) and not self._left_behind:
-            what = f"{self.transport.name} was not closed: use `with bubbleskin.connect(…) as skin`, or `skin.close()`."
-            warnings.warn(what, ResourceWarning, source=self, stacklevel=2)
+        if getattr(self, "warns", False) and self.open and not self._owner.left_behind:
+            warnings.warn(
+                f"{self.transport.name} was not closed; use it in a with block.", ResourceWarning, stacklevel=2
+            )
             with contextlib.suppress(Exception):
                 self.transport.close()
 
@@ -101,7 +101,7 @@ class Link(Serviced):
 
     async def hello(self) -> Message:
         """Open a session. `WrongDevice` where there is no wristband, or one we cannot talk to."""
-        self._check_process()
+        self._owner.check()
         with self.guard:
             try:
                 return await self._open(self.transport.now() + self.timeout)
@@ -125,7 +125,7 @@ class Link(Serviced):
         whether the request may have been applied. `DeviceRestarted` where the device has forgotten everything.
         Where several have failed, the first one's error is raised.
         """
-        self._check_process()
+        self._owner.check()
         with self.guard:
             patience = self.timeout if timeout is None else timeout
             deadline = self.transport.now() + patience
@@ -158,7 +158,7 @@ class Link(Serviced):
 
     async def wait(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
         """Take what comes until `done()`, or the transport's clock stands at `until`, s; keep the link alive meanwhile."""
-        self._check_process()
+        self._owner.check()
         with self.guard:
             while not done() and (now := self.transport.now()) < until:
                 self._service(now)
@@ -168,7 +168,7 @@ class Link(Serviced):
         """Let go of the transport."""
         self.closed = True
         self.open = False
-        if self._left_behind:
+        if self._owner.left_behind:
             return
         self._line.keep = False
         try:
@@ -178,20 +178,6 @@ class Link(Serviced):
         finally:
             with self.guard:
                 self.transport.close()
-
-    def leave_behind(self) -> None:
-        """This is a copy in a forked process: what it holds of the port is let go of, and every call is refused.
-
-        The session, its numbers and the lock of another thread are copies too: one request from here would make the
-        wristband take the next one of the process that opened the port for a duplicate.
-        """
-        self._left_behind = True
-        self.transport.leave_behind()
-
-    def _check_process(self) -> None:
-        """`LinkError` in a process that was forked from the one that opened this; before the lock, which may be another's."""
-        if self._left_behind:
-            raise errors.other_process(self.transport.name, self._process, os.getpid())
 
     def _outcome(self, request: Request) -> Message:
         if request.error:
@@ -386,19 +372,6 @@ class Link(Serviced):
             self._rtt.update(now - sent_at)
             if self.on_ping:
                 self.on_ping(sent_at, message, now)
-
-
-_here: "weakref.WeakSet[Link]" = weakref.WeakSet()
-"""The links of this process."""
-
-
-def _leave_all_behind() -> None:
-    for link in tuple(_here):
-        link.leave_behind()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_leave_all_behind)
 
 
 def _all_done(left: list[Request]) -> bool:
