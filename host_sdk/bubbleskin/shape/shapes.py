@@ -57,7 +57,7 @@ def parse_heights(texts: Sequence[str]) -> NDArray[np.float64]:
             heights.append(table.number(Cell(text.strip(), 1, position)))
         except CellError as error:
             raise InvalidInput(
-                f"{checks.shown(text)}, for bubble {position - 1}, is no height in mm: it {error}. Give a number for each bubble."
+                f"{checks.shown(text)}, for bubble {position - 1}, is not a height in mm: it {error}. Give one for each bubble."
             ) from None
     return np.array(heights)
 
