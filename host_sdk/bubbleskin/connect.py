@@ -37,7 +37,7 @@ def connect(url: str | os.PathLike[str] | None = None, *, timeout: float = 2.0, 
     patience = _checked(timeout, layout)
     transport, board = open_transport(url)
     skin = Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout)))
-    skin.link.warns = True
+    skin.link.warns = transport.blocks  # a simulated board holds nothing that anybody else could want
     return skin
 
 
@@ -48,7 +48,7 @@ async def aconnect(
     patience = _checked(timeout, layout)
     transport, board = open_transport(url)
     skin = await AsyncSkin.open(transport, patience, event_loop=True, simulated=board, layout=layout)
-    skin.link.warns = True
+    skin.link.warns = transport.blocks  # a simulated board holds nothing that anybody else could want
     return skin
 
 
