@@ -178,6 +178,11 @@ def test_what_cannot_be_asked_is_a_sentence(options, said):
     assert said in str(caught.value)
 
 
+def test_an_argument_that_is_none_is_a_sentence():
+    with pytest.raises(bs.InvalidInput, match="A plant has no option 'rubbber'; known are rubber, sheet"):
+        SimulatedBoardOf(rubbber="real")
+
+
 @pytest.mark.parametrize(
     ("figures", "said"),
     [
