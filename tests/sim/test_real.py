@@ -342,6 +342,20 @@ def test_half_the_substep_is_the_same_motion(stiffer):
     assert np.abs(one - other).max() < 0.002
 
 
+def test_steps_are_as_short_as_the_figures_need():
+    """A node of a tenth of the volume, which steps of 50 µs would fling about."""
+    heights = []
+    for substep in (50e-6, 5e-6):
+        plant = make(node_volume=0.005e-6, viscosity=15.0, substep=substep)
+        for tick in range(100):
+            step(plant, fill=3e-3 * (tick < 50), vent=3e-3 * (tick >= 90))
+        heights.append(plant.height_mm[0])
+    assert heights[0] > 6.0
+    assert heights[0] == pytest.approx(heights[1], abs=0.002)
+    with pytest.raises(bs.InvalidInput, match=r"need steps of .* µs, which would take forever: a node volume"):
+        make(node_volume=1e-12)
+
+
 def test_another_rubber_is_a_sentence():
     with pytest.raises(bs.InvalidInput, match="rubber is 'wood'; choose one of ideal, real"):
         Plant(replace(PlantParameters.nominal(1), rubber="wood"))
