@@ -1,13 +1,16 @@
 """One wristband, real or simulated, for asyncio. It does the work; `Skin` runs it without an event loop."""
 
+import asyncio
+import contextlib
 import os
 from collections.abc import AsyncGenerator, Iterable, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self, overload
+from typing import TYPE_CHECKING, Literal, NoReturn, Self, overload
 
 import numpy as np
 
 from bubble_protocol.schema import sequences, system
+from bubbleskin import checks
 from bubbleskin.device import tables as device_tables
 from bubbleskin.device.faults import Fault, read_log
 from bubbleskin.device.health import Health, TickHistogram
@@ -18,7 +21,7 @@ from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
 from bubbleskin.device.trim import ROWS_MOST, Trim
 from bubbleskin.device.trim import check as check_trim
-from bubbleskin.errors import DeviceFault, InvalidInput
+from bubbleskin.errors import DeviceFault, InvalidInput, LinkError
 from bubbleskin.fault_guide import remedies
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
@@ -45,6 +48,9 @@ UNASKED_END = "it was stopped or vented, or its host was silent for too long; se
 
 OVER_MAX = 60.0
 """Seconds that a change of shape may take at most."""
+
+PINGS_MAX = 10_000
+"""PINGs that one call of `synchronise` sends at most: a minute of them."""
 
 _POLL = 0.02
 """Seconds between two looks at whether a shape has settled."""
@@ -91,18 +97,28 @@ class AsyncSkin:
         self._telemetry.opened()
 
     @overload
-    async def show(self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True) -> State: ...
+    async def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True, *, fill: str | None = None
+    ) -> State: ...
     @overload
-    async def show(self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False]) -> None: ...
+    async def show(
+        self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False], fill: str | None = None
+    ) -> None: ...
     @overload
-    async def show(self, heights_mm: Heights, over: float, wait: Literal[False]) -> None: ...
+    async def show(
+        self, heights_mm: Heights, over: float, wait: Literal[False], *, fill: str | None = None
+    ) -> None: ...
     @overload
-    async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None: ...
-    async def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
+    async def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+    ) -> State | None: ...
+    async def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+    ) -> State | None:
         """See `Skin.show`."""
-        heights = sample(heights_mm, self.layout, self.info.height_max_mm)
-        if not 0.0 <= over <= OVER_MAX:
-            raise InvalidInput(f"over is {over} s; a change may take 0 to {OVER_MAX:g} s.")
+        heights = sample(heights_mm, self.layout, self.info.height_max_mm, fill)
+        over = checks.number("over", over, 0.0, OVER_MAX, "s")
+        checks.flag("wait", wait)
         micrometres = np.rint(heights * 1000).astype(int).tolist()
         await self.link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
         return await self._settle(over + SETTLE) if wait else None
@@ -155,8 +171,7 @@ class AsyncSkin:
     async def restart(self, into: str = "firmware") -> None:
         """See `Skin.restart`."""
         numbers = {name: number for number, name, _ in system.RESTARTS}
-        if into not in numbers:
-            raise InvalidInput(f"A wristband cannot restart into {into!r}; choose one of {', '.join(numbers)}.")
+        checks.one_of("into", into, tuple(numbers))
         await self.link.call("RESTART", (numbers[into],))
         self.link.restart_asked = True
         self.link.open = False  # the next call opens a session with the new boot
@@ -177,7 +192,7 @@ class AsyncSkin:
 
     async def synchronise(self, pings: int = PINGS) -> Clock:
         """Send pings at once, for the clock to begin with; returns it."""
-        await self.link.send_pings(pings)
+        await self.link.send_pings(checks.whole("pings", pings, 1, PINGS_MAX))
         return self.clock
 
     @overload
@@ -200,8 +215,16 @@ class AsyncSkin:
         self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress | None = None
     ) -> PlaybackReport | None:
         """See `Skin.play`."""
-        started = await self._player.start(sequence, at, follow=wait)
-        return await self._player.follow(started, progress) if wait else None
+        checks.flag("wait", wait)
+        if progress is not None and not callable(progress):
+            raise InvalidInput(f"progress is {checks.shown(progress)}; give a function of one PlaybackStatus, or None.")
+        try:
+            started = await self._player.start(sequence, at, follow=wait)
+            return await self._player.follow(started, progress) if wait else None
+        except (asyncio.CancelledError, KeyboardInterrupt):  # nobody follows it any more
+            with contextlib.suppress(LinkError):
+                await self.stop()
+            raise
 
     async def playing(self) -> PlaybackStatus:
         """See `Skin.playing`."""
@@ -238,7 +261,8 @@ class AsyncSkin:
 
     async def acknowledge(self, fault: Fault | int) -> None:
         """See `Skin.acknowledge`."""
-        await self._isolation(await self.link.call("FAULTS_ACK", (fault.id if isinstance(fault, Fault) else fault,)))
+        number = fault.id if isinstance(fault, Fault) else checks.whole("The id of a fault", fault, 0, 0xFFFF)
+        await self._isolation(await self.link.call("FAULTS_ACK", (number,)))
 
     async def _isolation(self, acknowledged: Message) -> None:
         """Wait until what is acknowledged has been isolated for long enough, and the wristband lets go of it."""
@@ -260,6 +284,8 @@ class AsyncSkin:
         self, tables: "Sequence[Table] | Table | Calibration", save: bool = False, *, anyway: bool = False
     ) -> None:
         """See `Skin.upload_tables`."""
+        checks.flag("save", save)
+        checks.flag("anyway", anyway)
         each = device_tables.one_per_bubble(tables, self.info)
         if not anyway:
             device_tables.check(each, self.info)
@@ -278,6 +304,9 @@ class AsyncSkin:
 
     async def upload_trim(self, trim: Trim, save: bool = False, *, anyway: bool = False) -> None:
         """See `Skin.upload_trim`."""
+        checks.instance("trim", trim, Trim, "a Trim, such as dataclasses.replace(skin.trim(), zero=…)")
+        checks.flag("save", save)
+        checks.flag("anyway", anyway)
         rows = trim.rows(self.info.bubbles)
         if not anyway:
             check_trim(trim)
@@ -307,6 +336,7 @@ class AsyncSkin:
 
     async def sleep(self, seconds: float) -> None:
         """See `Skin.sleep`."""
+        seconds = checks.number("seconds", seconds, 0.0, unit="s")
         await self.link.wait(self.link.transport.now() + seconds)
 
     async def aclose(self) -> None:
@@ -315,6 +345,9 @@ class AsyncSkin:
             await self._telemetry.aclose()
         finally:
             await self.link.close()
+
+    def __reduce__(self) -> NoReturn:
+        raise InvalidInput("A skin cannot be sent to another process or copied; connect in that process.")
 
     def __repr__(self) -> str:
         return describe("AsyncSkin", self.link, self.info)

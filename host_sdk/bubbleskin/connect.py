@@ -1,9 +1,10 @@
 """From a URL to a wristband: serial ports, sockets, and simulated boards."""
 
+import os
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from bubbleskin import boards
+from bubbleskin import boards, checks
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
@@ -16,10 +17,12 @@ if TYPE_CHECKING:
     from bubbleskin.sim.board import Simulated
 
 SIMULATED = ("sim", "micropython", "rp2040")
+TIMEOUT_MAX = 3600.0
+"""Seconds that a device may be given to answer, at most."""
 NETWORK = ("socket", "rfc2217")
 
 
-def connect(url: str | None = None, *, timeout: float = 2.0, layout: Layout | None = None) -> Skin:
+def connect(url: str | os.PathLike[str] | None = None, *, timeout: float = 2.0, layout: Layout | None = None) -> Skin:
     """Open a wristband.
 
     `url`: a serial port (`/dev/ttyACM0`, `COM3`), `socket://host:port`, `rfc2217://host:port`, or a simulated
@@ -31,22 +34,33 @@ def connect(url: str | None = None, *, timeout: float = 2.0, layout: Layout | No
     Raises `InvalidInput` for a URL that cannot be meant, `LinkError` where nothing can be opened and
     `WrongDevice` where what is there is no wristband.
     """
-    patience = _checked(timeout)
+    patience = _checked(timeout, layout)
     transport, board = open_transport(url)
-    return Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout)))
+    skin = Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout)))
+    skin.link.warns = transport.blocks  # a simulated board holds nothing that anybody else could want
+    return skin
 
 
-async def aconnect(url: str | None = None, *, timeout: float = 2.0, layout: Layout | None = None) -> AsyncSkin:
+async def aconnect(
+    url: str | os.PathLike[str] | None = None, *, timeout: float = 2.0, layout: Layout | None = None
+) -> AsyncSkin:
     """The same for asyncio: a skin whose methods are coroutines."""
-    patience = _checked(timeout)
+    patience = _checked(timeout, layout)
     transport, board = open_transport(url)
-    return await AsyncSkin.open(transport, patience, event_loop=True, simulated=board, layout=layout)
+    skin = await AsyncSkin.open(transport, patience, event_loop=True, simulated=board, layout=layout)
+    skin.link.warns = transport.blocks  # a simulated board holds nothing that anybody else could want
+    return skin
 
 
-def open_transport(url: str | None) -> "tuple[Transport, Simulated | None]":
+def open_transport(url: str | os.PathLike[str] | None) -> "tuple[Transport, Simulated | None]":
     """The transport for a URL, and the simulated board behind it where there is one."""
     if url is None:
         return SerialTransport(only_attached()), None
+    url = os.fspath(url) if isinstance(url, os.PathLike) else url
+    if not isinstance(url, str):
+        raise InvalidInput(
+            f"The device is {checks.shown(url)}; give a port or a URL as a text, such as 'sim://{boards.DEFAULT}'."
+        )
     if not url.strip():
         raise InvalidInput(f"The device's name is empty; give a port or a URL, such as sim://{boards.DEFAULT}.")
     scheme, separator, rest = url.partition("://")
@@ -78,7 +92,8 @@ def _open_simulated(scheme: str, rest: str) -> "tuple[Transport, Simulated]":
     return open_board(scheme, board, dict(parse_qsl(options, keep_blank_values=True)))
 
 
-def _checked(timeout: float) -> float:
-    if not 0 < timeout < float("inf"):
-        raise InvalidInput(f"timeout is {timeout}; give the seconds within which a device must answer, such as 2.")
-    return timeout
+def _checked(timeout: float, layout: Layout | None) -> float:
+    """The timeout, where both can be meant."""
+    if layout is not None:
+        checks.instance("layout", layout, Layout, "a Layout, or None for the one that the device tells")
+    return checks.above_zero("timeout", timeout, TIMEOUT_MAX, "s")

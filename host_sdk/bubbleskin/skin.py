@@ -3,7 +3,7 @@
 import os
 from collections.abc import AsyncGenerator, Iterable, Iterator, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self, overload
+from typing import TYPE_CHECKING, Literal, NoReturn, Self, overload
 
 from bubbleskin.async_skin import AsyncSkin, describe
 from bubbleskin.device.faults import Fault
@@ -13,6 +13,7 @@ from bubbleskin.device.settings import Setting
 from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
 from bubbleskin.device.trim import Trim
+from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link, run_sync
@@ -62,22 +63,31 @@ class Skin:
         return self._skin.simulated
 
     @overload
-    def show(self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True) -> State: ...
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True, *, fill: str | None = None
+    ) -> State: ...
     @overload
-    def show(self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False]) -> None: ...
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False], fill: str | None = None
+    ) -> None: ...
     @overload
-    def show(self, heights_mm: Heights, over: float, wait: Literal[False]) -> None: ...
+    def show(self, heights_mm: Heights, over: float, wait: Literal[False], *, fill: str | None = None) -> None: ...
     @overload
-    def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None: ...
-    def show(self, heights_mm: Heights, over: float = 0.0, wait: bool = True) -> State | None:
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+    ) -> State | None: ...
+    def show(
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+    ) -> State | None:
         """Take a shape.
 
         `heights_mm`: one height per bubble (n,), a 2-D heightfield stretched over the layout, or f(x_mm, y_mm).
         Heights from 0 to `info.height_max_mm`; up to `info.height_rest_mm` means no pressure. `over`: seconds
         the change should take, 0 as fast as the valves can. With `wait`, returns the state once every bubble
-        has settled and raises `DeviceFault` if one does not; otherwise returns None at once.
+        has settled and raises `DeviceFault` if one does not; otherwise returns None at once. `fill`: 'nearest' gives
+        entries of a heightfield that are masked or nan the number of the nearest one; without it they are refused.
         """
-        return run_sync(self._skin.show(heights_mm, over, wait))
+        return run_sync(self._skin.show(heights_mm, over, wait, fill=fill))
 
     def state(self) -> State:
         """Heights, pressures, targets and status of all bubbles, now."""
@@ -136,7 +146,8 @@ class Skin:
     ) -> PlaybackReport | None:
         """Play a sequence by the device's own clock; it takes over from whatever the bubbles did before.
 
-        `sequence`: a `Sequence`, something that has one (a `Plan`), or the path of a .json or .csv file. It is checked
+        `sequence`: a `Sequence`, something that has one (a `Plan`), the path of a .json or .csv file, or a name of the library
+        such as 'pulse'. It is checked
         against this device before a byte is sent, and again there. `at`: device time in s, as of `state().time`, at
         which to begin; None is now, and a time that has passed is refused. With `wait`, follows it to its end, tells
         `progress` of every step, and returns when each began; raises `DeviceFault` where it does not come to its end:
@@ -270,6 +281,9 @@ class Skin:
     def close(self) -> None:
         """Let go of the device. Without a host it holds what moves after 250 ms and vents after 1 s, see `settings`."""
         run_sync(self._skin.aclose())
+
+    def __reduce__(self) -> NoReturn:
+        raise InvalidInput("A skin cannot be sent to another process or copied; connect in that process.")
 
     def __repr__(self) -> str:
         return describe("Skin", self.link, self.info)

@@ -199,7 +199,7 @@ def test_play_takes_files_and_prints_json(run, tmp_path):
         (["nothing"], ["'nothing'", "pulse", "flat-twin"]),
         (["nowhere.json"], ["nowhere.json", "Cannot read"]),
         (["pulse", "--loops", "-1"], ["plays -1 times"]),
-        (["pulse", "--at", "nan"], ["cannot start at nan"]),
+        (["pulse", "--at", "nan"], ["at is nan"]),
     ],
 )
 def test_what_cannot_be_played_is_one_sentence(run, what, words):

@@ -175,7 +175,7 @@ SIZES = {"c2_pa": 400, "c3_pa": 60, "thickness_mm": 1, "diameter_mm": 5}
         (lambda: YeohBalloon(wall="fat"), "'thin', 'thick'"),
         (lambda: YeohBalloon(surface="outer"), "thin wall has one diameter"),
         (lambda: YeohBalloon(wall="thick", surface="outer", thickness=2.5e-3), "no room for air"),
-        (lambda: YeohBalloon(mu="soft"), "not 'soft'"),
+        (lambda: YeohBalloon(mu="soft"), "not texts: 'soft'"),
         (lambda: YeohBalloon(mu=[1e4, 2e4]), "one number"),
         (lambda: YeohBalloon.with_units(mu_kpa=40, c1_kpa=20, **SIZES), "mu_kpa and c1_kpa"),
         (lambda: YeohBalloon.with_units(**SIZES), "none was given"),

@@ -88,7 +88,7 @@ def test_damaged_files_are_refused_in_a_sentence(calibration, change, says):
 def test_missing_and_unwritable_files(calibration, tmp_path):
     with pytest.raises(InvalidInput, match="No such file"):
         Calibration.load(tmp_path / "nowhere.toml")
-    with pytest.raises(InvalidInput, match="cannot write"):
+    with pytest.raises(InvalidInput, match="cannot be written"):
         calibration.save(tmp_path / "nowhere" / "a.toml")
     with pytest.raises(InvalidInput, match="no bubble 7"):
         calibration.table(7)

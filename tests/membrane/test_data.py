@@ -111,6 +111,6 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InvalidInput, match="No such file"):
         read_csv(tmp_path / "nowhere.csv")
     path = tmp_path / "picture.csv"
-    path.write_bytes(b"\x89PNG\xff\xfe")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
     with pytest.raises(InvalidInput, match="not text"):
         read_csv(path)

@@ -124,7 +124,7 @@ def test_bytes_are_little_endian_pairs():
         (lambda: Table([0, 65535], [0, 65535]), "overflow"),
         (lambda: Table.from_bytes(b"123"), "4 bytes per knot"),
         (lambda: Table([5000, 6000], [0, 7]).max_error(), "without a balloon"),
-        (lambda: build_table(YeohBalloon(), knots=65), "not 65"),
+        (lambda: build_table(YeohBalloon(), knots=65), "knots is 65"),
         (lambda: build_table(YeohBalloon(), height_mm=(5, 5.01)), "must span"),
         (lambda: build_table(YeohBalloon(mu=200e3)), "kPa, but a table ends at 65.535 kPa"),
     ],

@@ -110,15 +110,15 @@ def test_bad_rows_are_left_out_on_request_only(run, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("fit", "nowhere.csv"), "cannot read nowhere.csv"),
+        (("fit", "nowhere.csv"), "Cannot read the measurements nowhere.csv"),
         (("fit", BUBBLE, "--thickness-mm", "0"), "thickness is 0 m"),
         (("fit", BUBBLE, "--height-noise-mm", "-1"), "height_sd"),
         (("table", "--preset", "rubber"), "no preset 'rubber'; there are paper"),
         (("table", "--mu-kpa", "40", "--c1-kpa", "20"), "exactly one of"),
         (("table", "--bubbles", "0"), "--bubbles must be 1 or more"),
-        (("table", "--knots", "1"), "2 to 64 knots"),
+        (("table", "--knots", "1"), "knots is 1; 2 to 64 is allowed"),
         (("table", "--up-to-mm", "nan"), "height_mm is nan"),
-        (("table", "--show", "nowhere.toml"), "cannot read nowhere.toml"),
+        (("table", "--show", "nowhere.toml"), "Cannot read the calibration nowhere.toml"),
         (("plot", "curve", "--diameter-is", "inner"), "thin wall has one diameter"),
     ],
 )

@@ -79,7 +79,7 @@ def test_a_film_needs_two_frames_and_an_ending(tmp_path):
 
 
 def test_a_film_that_cannot_be_written_is_one_sentence(tmp_path):
-    with pytest.raises(InvalidInput, match=r"Cannot write the film .*No such file or directory"):
+    with pytest.raises(InvalidInput, match=r"The film .* cannot be written: No such file or directory"):
         animate(LAYOUT, [frame(0, LOW), frame(1, LOW)], tmp_path / "nowhere" / "film.gif")
 
 

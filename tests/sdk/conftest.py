@@ -210,15 +210,18 @@ class Tap(Transport):
 @pytest.fixture
 def tapped():
     """`tapped(board="wristband7", seed=0, spread=0.0, **changes)`: a skin on a simulated board, and the tap between."""
-    boards = []
+    boards, skins = [], []
 
     def make(board="wristband7", seed=0, spread=0.0, timeout=2.0, **changes):
         simulated = SimulatedBoard(board, seed=seed, spread=spread, contact=False)
         boards.append(simulated)
         tap = Tap(SimulatedTransport(simulated, board), **changes)
         tap.skin = Skin(run_sync(AsyncSkin.open(tap, timeout, simulated=simulated)))
+        skins.append(tap.skin)
         return tap.skin, tap
 
     yield make
+    for skin in skins:
+        skin.close()
     for board in boards:
         board.close()

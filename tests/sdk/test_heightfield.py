@@ -110,23 +110,33 @@ def test_an_error_in_a_function_is_the_functions():
     [
         (np.full(18, 6.0), "18 heights for 19 bubbles: give one height in mm per bubble"),
         ([], "0 heights for 19 bubbles"),
-        (6.0, r"An array of shape \(\) for 19 bubbles"),
+        (6.0, r"One height for 19 bubbles: .* write \[6\] \* 19"),
         (np.zeros((2, 2, 2)), r"An array of shape \(2, 2, 2\) for 19 bubbles"),
         (np.zeros((0, 3)), "at least one entry"),
-        ([[6, 7], [8]], "must be numbers of mm"),
-        (["a"] * 19, "must be numbers of mm"),
-        ({"height": 6}, "must be numbers of mm"),
+        ([[6, 7], [8]], r"not \[\[6, 7\], \[8\]\] \(its rows differ in length\)"),
+        (["a"] * 19, "an array of numbers, not texts"),
+        ({"height": 6}, "is a dict; give one height per bubble"),
+        ("dome", r"shapes\.dome\(skin\.layout\)"),
+        ([0.012] * 19, "metres, give them times 1000"),
+        ([12000] * 19, "µm, give them divided by 1000"),
+        (np.full((4, 4), 200, np.uint8), "image / 255 \\* 14"),
+        (np.zeros((4, 4, 3)), r"image\.mean\(axis=2\)"),
+        ([True] * 19, "not yes or no"),
+        ([1j] * 19, "not complex"),
+        ([np.timedelta64(1, "s")] * 19, "not spans of time"),
+        ([10**400] * 19, "beyond every number"),
+        (np.ma.masked_equal([[9.0, 0.0], [8.0, 9.0]], 0.0), r"is masked at \(0, 1\)"),
         (None, "for 19 bubbles"),
         (np.full(19, -1.0), "bubble 0, -1 mm, is negative; heights are 0 to 14 mm"),
         (np.where(np.arange(19) == 4, np.nan, 6), "bubble 4, nan mm, is not a number"),
         (np.where(np.arange(19) == 18, -np.inf, 6), "bubble 18, -inf mm, is not a number"),
         (np.where(np.arange(19) == 3, 14.001, 6), "bubble 3, .* is above the limit of 14 mm"),
         (np.full((4, 4), 14.1), "above the limit of 14 mm"),
-        ([[6, math.nan], [6, 6]], "is not a number"),
+        ([[6, math.nan], [6, 6]], r"is nan at \(0, 1\): nothing is known there. .* fill='nearest'"),
         (lambda x, y: x, "bubble .* is negative"),
-        (lambda x, y: [6, 6], r"shape \(19, 2\) for 19 bubbles"),
-        (lambda x, y: "high", "must be numbers of mm"),
-        (lambda x, y: None, "is not a number"),
+        (lambda x, y: [6, 6], "at bubble 0 must be one number, not 2"),
+        (lambda x, y: "high", "at bubble 0 .* not texts"),
+        (lambda x, y: None, "at bubble 0 is nan"),
     ],
 )
 def test_what_cannot_be_meant_is_one_clear_sentence(heights, sentence):
@@ -134,3 +144,22 @@ def test_what_cannot_be_meant_is_one_clear_sentence(heights, sentence):
         sample(heights, HEX, MAX_MM)
     assert str(caught.value).endswith(".")
     assert "\n" not in str(caught.value)
+
+
+def test_what_is_not_known_is_filled_from_the_nearest_when_asked():
+    layout = bs.Layout.grid(2, 2)
+    masked = np.ma.masked_equal([[9.0, 0.0], [8.0, 7.0]], 0.0)
+    unknown = [[9.0, math.nan], [8.0, 7.0]]
+    for field in (masked, unknown):
+        taken = sample(field, layout, MAX_MM, "nearest")
+        assert taken[[0, 2, 3]].tolist() == [9, 8, 7]
+        assert taken[1] in (9, 7), "the nearest: never the 0 that stood under the mask"
+    with pytest.raises(bs.InvalidInput, match="nothing to fill it with"):
+        sample([[math.nan]], layout, MAX_MM, "nearest")
+    with pytest.raises(bs.InvalidInput, match="must be one of 'nearest'"):
+        sample(unknown, layout, MAX_MM, "linear")
+
+
+def test_show_fills_when_asked():
+    with bs.connect("sim://wristband7?contact=0") as skin:
+        assert skin.show([[9.0, math.nan], [9.0, 9.0]], fill="nearest").target_mm.tolist() == [9.0] * 7

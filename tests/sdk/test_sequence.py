@@ -110,18 +110,18 @@ BAD_JSON = {
     ),
     "a word": (
         {"bubbleskin_sequence": 1, "steps": [{"targets_mm": ["high", 6]}]},
-        "bubble 0 must be a number; 'high' is none",
+        "bubble 0 must be a number .* not texts: 'high'",
     ),
-    "true": ({"bubbleskin_sequence": 1, "steps": [{"targets_mm": [True, 6]}]}, "must be a number; True is none"),
+    "true": ({"bubbleskin_sequence": 1, "steps": [{"targets_mm": [True, 6]}]}, "must be a number .*: True"),
     "negative": ({"bubbleskin_sequence": 1, "steps": [{"targets_mm": [6, -1]}]}, "bubble 1 is -1 mm"),
     "a long ramp": ({"bubbleskin_sequence": 1, "steps": [{**STEP, "ramp_s": 61}]}, "The ramp is 61 s; 0 to 60 s"),
     "an easing": (
         {"bubbleskin_sequence": 1, "steps": [{**STEP, "easing": "bouncy"}]},
-        "'bouncy'; choose one of linear",
+        "'bouncy', but must be one of 'linear'",
     ),
     "a then": (
         {"bubbleskin_sequence": 1, "steps": [{**STEP, "until": {"then": "explode"}}]},
-        "'explode'; choose one of go on",
+        "'explode', but must be one of 'go on'",
     ),
     "a tolerance": (
         {"bubbleskin_sequence": 1, "steps": [{**STEP, "until": {"settled_mm": 0}}]},
@@ -131,7 +131,7 @@ BAD_JSON = {
         {"bubbleskin_sequence": 1, "steps": [{**STEP, "until": {"after_s": 1, "then": "vent"}}]},
         r"steps\[0\].until has 'then'",
     ),
-    "no time": ({"bubbleskin_sequence": 1, "steps": [{"targets_mm": [6, 7]}]}, "must take time"),
+    "no time": ({"bubbleskin_sequence": 1, "steps": [{"targets_mm": None}]}, "only waits"),
     "counts": (
         {"bubbleskin_sequence": 1, "steps": [STEP, {"targets_mm": [6], "ramp_s": 1}]},
         "2 targets; the sequence is for 1 bubbles",
@@ -273,18 +273,20 @@ def test_times_of_a_long_timeline_do_not_drift(tmp_path):
 
 BAD_CSV = {
     "no header": ("0,6\n1,7\n", "begins with the columns 0,6; a timeline has time_s,b0"),
-    "columns in another order": ("time_s,b1,b0\n0,6,7\n", "begins with the columns"),
+    "columns that miss one": ("time_s,b0,b2\n0,6,7\n", "has no column b1"),
+    "columns that count from one": ("time_s,b1,b2\n0,6,7\n", "bubbles count from 0: name them b0 to b1"),
+    "a column twice": ("time_s,b0,b0\n0,6,7\n", "has no column b1"),
     "no bubbles": ("time_s\n0\n", "begins with the columns"),
     "nothing": ("", "begins with the columns"),
     "only a header": ("time_s,b0\n", "no rows"),
-    "a word": ("time_s,b0\n0,high\n", "line 2 has 'high'"),
-    "a missing cell": ("time_s,b0,b1\n0,6\n", "line 2 has 2 cells; there are 3"),
+    "a word": ("time_s,b0\n0,high\n", "line 2, column b0: it is 'high', not a number"),
+    "a missing cell": ("time_s,b0,b1\n0,6\n", "line 2 has 2 cells under 3 headings"),
     "no time": ("time_s,b0\n,6\n", "line 2 has no time"),
     "time that stands": ("time_s,b0\n0,6\n1,7\n1,8\n", "line 4 is at 1 s, not after"),
     "time that runs back": ("time_s,b0\n1,6\n0.5,7\n", "line 3 is at 0.5 s"),
     "a gap": ("time_s,b0\n1,6\n100,7\n", "line 3: The ramp is 99 s"),
     "a height": ("time_s,b0\n1,-6\n", "line 2: The target of bubble 0 is -6 mm"),
-    "infinity": ("time_s,b0\n1,inf\n", "line 2: The target of bubble 0 must be a finite number"),
+    "infinity": ("time_s,b0\n1,inf\n", "line 2, column b0: it is inf, not a number"),
 }
 
 

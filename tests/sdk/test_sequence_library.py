@@ -85,8 +85,8 @@ def test_a_wave_travels_and_a_ripple_runs_outwards():
     ("how", "sentence"),
     [
         ({"low_mm": 12.0}, "from 12.0 to 12.0"),
-        ({"low_mm": -1.0}, "low must be"),
-        ({"high_mm": np.nan}, "from 5.5 to nan"),
+        ({"low_mm": -1.0}, "low"),
+        ({"high_mm": np.nan}, "high_mm is nan"),
     ],
 )
 @pytest.mark.parametrize("name", ["pulse", "wave", "ripple", "breathing"])
@@ -99,5 +99,5 @@ def test_impossible_heights_are_refused(name, how, sentence):
     ("name", "how"), [("wave", {"period": 0}), ("breathing", {"period": -1}), ("ripple", {"wavelength_mm": 0})]
 )
 def test_impossible_times_are_refused(name, how):
-    with pytest.raises(bs.InvalidInput, match="it must be positive"):
+    with pytest.raises(bs.InvalidInput, match="it must be above zero"):
         LIBRARY[name](bs.Layout.hexagon(), **how)

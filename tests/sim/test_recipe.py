@@ -129,6 +129,23 @@ def test_a_leak_of_one_per_cent_a_second_takes_that_of_a_full_bubble(rubber):
         assert 1 - plant.air / before == pytest.approx(0.001, rel=0.01)
 
 
+def test_warm_gas_flows_faster_where_the_rubber_is_ideal_too():
+    """By volume, as √T through an orifice; both plants agree on the first dose, but that one counts pV and the other mass."""
+    doses = {}
+    for rubber in ("ideal", "real"):
+        for gas in (20.0, 40.0):
+            with SimulatedBoardOf(rubber=rubber, gas_c=gas) as board:
+                plant = board.plant
+                plant.rest_at(10.0)
+                before = plant.air
+                plant.advance(5e-3, np.full(7, 3e-3), np.zeros(7))
+                doses[rubber, gas] = float((plant.air - before)[0])
+    warm = np.sqrt(313.15 / 293.15)
+    assert doses["ideal", 40.0] / doses["ideal", 20.0] == pytest.approx(warm, rel=2e-3)
+    assert doses["real", 40.0] / doses["real", 20.0] == pytest.approx(1 / warm, rel=2e-3)
+    assert doses["real", 20.0] == pytest.approx(doses["ideal", 20.0], rel=0.02)
+
+
 @pytest.mark.parametrize("rubber", ["ideal", "real"])
 def test_sensors_are_gauges_at_any_altitude(rubber):
     with SimulatedBoardOf(rubber=rubber, atmosphere_kpa=84.0) as board:
@@ -159,6 +176,11 @@ def test_what_cannot_be_asked_is_a_sentence(options, said):
     with pytest.raises(bs.InvalidInput) as caught:
         bs.connect(f"sim://wristband7?{options}")
     assert said in str(caught.value)
+
+
+def test_an_argument_that_is_none_is_a_sentence():
+    with pytest.raises(bs.InvalidInput, match="A plant has no option 'rubbber'; known are rubber, sheet"):
+        SimulatedBoardOf(rubbber="real")
 
 
 @pytest.mark.parametrize(

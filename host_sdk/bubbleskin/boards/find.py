@@ -8,6 +8,7 @@ from types import ModuleType
 
 from bubble_firmware import boards
 from bubbleskin.boards.check import check
+from bubbleskin.checks import instance
 from bubbleskin.errors import InvalidInput
 
 DEFAULT = boards.DEFAULT
@@ -34,6 +35,7 @@ def load(board: str | Path) -> ModuleType:
 
     Raises `InvalidInput` where there is none, or where its file does not define what a board needs.
     """
+    instance("The board", board, (str, Path), f"its name, such as {DEFAULT!r}, or the path of its file")
     if is_file(board):
         return _load_file(Path(board).expanduser())
     if board not in NAMES:

@@ -3,6 +3,7 @@
 import dataclasses
 import json as jsonlib
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 import numpy as np
@@ -11,14 +12,15 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from rich.table import Table
 
 from bubbleskin import boards
-from bubbleskin.cli.options import as_json, device
+from bubbleskin.checks import number
+from bubbleskin.cli.options import as_json, device, gathered
 from bubbleskin.connect import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
 from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
 from bubbleskin.fault_guide import guide
 from bubbleskin.shape import shapes
-from bubbleskin.shape.heightfield import Heights
+from bubbleskin.shape.heightfield import FILLS, Heights
 from bubbleskin.skin import Skin
 
 
@@ -112,6 +114,16 @@ def info(device: str | None, json: bool) -> None:
     Console().print(table)
 
 
+class _Way(NamedTuple):
+    """The one way in which a shape is said."""
+
+    heights: tuple[str, ...]
+    everywhere: float | None
+    shape: str | None
+    path: Path | None
+    fill: str | None
+
+
 @click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("heights", nargs=-1, metavar="[MM]...")
 @click.option("--all", "everywhere", type=float, metavar="MM", help="The same height for every bubble.")
@@ -119,6 +131,7 @@ def info(device: str | None, json: bool) -> None:
 @click.option(
     "--file", "path", type=click.Path(dir_okay=False, path_type=Path), help="A heightfield: .npy, or numbers in .csv."
 )
+@click.option("--fill", type=click.Choice(FILLS), help="What entries of --file that are not known are given.")
 @click.option("--over", type=float, default=0.0, show_default=True, help="Seconds the change should take.")
 @click.option(
     "--hold",
@@ -129,23 +142,17 @@ def info(device: str | None, json: bool) -> None:
 )
 @device
 @as_json
-def show(
-    heights: tuple[str, ...],
-    everywhere: float | None,
-    shape: str | None,
-    path: Path | None,
-    over: float,
-    hold: float,
-    device: str | None,
-    json: bool,
-) -> None:
+@gathered(way=_Way)
+def show(way: _Way, over: float, hold: float, device: str | None, json: bool) -> None:
     """Take a shape: one height in MM per bubble, or one of --all, --shape, --file."""
+    number("--hold", hold, 0.0)
+    heights, everywhere, shape, path, fill = way
     given = [bool(heights), everywhere is not None, shape is not None, path is not None]
     if sum(given) != 1:
         raise InvalidInput("Say the shape in one way: a height in mm per bubble, or one of --all, --shape and --file.")
     asked: Heights
     if path is not None:
-        asked = shapes.load(path)
+        asked = shapes.load(path, fill)
     elif everywhere is None:
         asked = shapes.parse_heights(heights)
     with connect(device) as skin:

@@ -1,7 +1,6 @@
 """`bubbleskin firmware`: make what runs on the wristband's chip."""
 
 import json as jsonlib
-import shutil
 import time
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +12,7 @@ from rich.console import Console
 from bubbleskin import boards
 from bubbleskin.cli.options import Board, as_json
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import write_bytes
 
 
 @click.group()
@@ -57,7 +57,7 @@ def build(chosen: tuple[str, ...], micropython: Path | None, output: Path | None
     built = build_firmware(wanted, micropython)
     seconds = time.monotonic() - started
     if output:
-        shutil.copyfile(built[wanted[0]], output)
+        write_bytes(output, built[wanted[0]].read_bytes(), "the firmware")
     console = Console(stderr=json)
     rows = []
     for board, uf2 in built.items():

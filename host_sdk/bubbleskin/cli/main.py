@@ -40,25 +40,44 @@ for _command in (
 
 
 def main(arguments: list[str] | None = None) -> Any:
-    """Run the command. A user's mistake is one line and exit status 2, a device's failure 1, no tracebacks."""
+    """Run the command. A user's mistake is one line and exit status 2, a device's failure 1, no tracebacks.
+
+    Ctrl-C ends with status 130, once the verb has left its device as it promises.
+    """
     try:
         with _logging():
             status = bubbleskin.main(arguments, prog_name="bubbleskin", standalone_mode=False)
+        sys.stdout.flush()  # here, where somebody still says what went wrong
         sys.exit(status if isinstance(status, int) else 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
     except click.ClickException as error:
         _end(f"{error.format_message()} See `{_path(error)} --help`.", 2)
-    except (click.Abort, KeyboardInterrupt):
+    except click.Abort as error:
+        if isinstance(error.__cause__, EOFError):  # click takes a library's for the end of the user's input
+            _end("A file or an input has ended too early.", 2)
+        _end("Stopped.", 130)
+    except KeyboardInterrupt:
         _end("Stopped.", 130)
     except InvalidInput as error:
         _end(str(error), 2)
     except BubbleskinError as error:
         _end(str(error), 1)
     except BrokenPipeError:  # whoever read our output has gone
-        sys.stderr.close()
+        _drop_output()
         sys.exit(1)
+    except OSError as error:
+        _drop_output()
+        _end(f"The output cannot be written: {error.strerror or error}. What was written before is whole.", 1)
+
+
+def _drop_output() -> None:
+    """Let what is still to be written to standard output go nowhere: Python would try again at its end, and complain."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
 
 
 @contextlib.contextmanager

@@ -84,6 +84,13 @@ fit_options = _options(
     click.option("--pressure-noise-kpa", type=float, default=0.15, show_default=True, help="One sigma."),
     click.option("--pooled", is_flag=True, help="One curve through all bubbles of the file."),
     click.option("--skip-bad-rows", is_flag=True, help="Leave bad rows out and name them."),
+    click.option(
+        "--first",
+        type=click.IntRange(0, 1),
+        default=0,
+        show_default=True,
+        help="The file's number of what is bubble 0 here.",
+    ),
 )
 material_options = _options(
     click.option("--preset", default="paper", show_default=True, help="paper, ecoflex-00-30, ..."),
@@ -121,6 +128,10 @@ def fit(data: Path, form: TableForm, output: Path | None, picture: Path | None, 
     """
     measurements, found = fit_file(data, **options)
     click.echo(json.dumps(found.as_dict(), indent=2) if as_json else found.report())
+    if options["first"] and not as_json:
+        click.echo(
+            f"numbers of bubbles are the wristband's: bubble 0 is number {options['first']} of {measurements.source}"
+        )
     if output:
         _calibration(found, f"fit of {measurements.source}", form).save(output)
         click.echo(f"wrote {output}", err=True)
@@ -208,6 +219,7 @@ def fit_file(
     data: Path,
     *,
     skip_bad_rows: bool = False,
+    first: int = 0,
     pooled: bool = False,
     height_noise_mm: float = 0.05,
     pressure_noise_kpa: float = 0.15,
@@ -218,7 +230,7 @@ def fit_file(
 
     size = Sizes(**sizes)
     with _said():
-        measurements = read_csv(data, skip_bad_rows=skip_bad_rows)
+        measurements = read_csv(data, skip_bad_rows=skip_bad_rows, first=first)
         return measurements, fit_measurements(
             measurements,
             pooled=pooled,

@@ -9,6 +9,7 @@ import click
 from rich.console import Console
 from rich.live import Live
 
+from bubbleskin.checks import above_zero
 from bubbleskin.cli.options import as_json, device
 from bubbleskin.connect import connect
 from bubbleskin.telemetry.recording import Table
@@ -37,6 +38,9 @@ _PINGED = 1.0
 def monitor(rate: float, seconds: float | None, path: Path | None, device: str | None, json: bool) -> None:
     """Watch heights, pressures and faults live; with --json, a line for each state."""
     from bubbleskin.plot.terminal import Monitor
+
+    if seconds is not None:
+        above_zero("--seconds", seconds, unit="s")
 
     console = Console()
     with connect(device) as skin, contextlib.ExitStack() as open_files:

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bubbleskin.checks import finite, number, one_of, positive
+from bubbleskin.checks import finite, instance, number, one_of, positive
 from bubbleskin.contact import energy as core
 from bubbleskin.contact.continuation import FINE, Outcome, PathFollower, Resolution, Snap, ramps
 from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
@@ -105,7 +105,7 @@ class CompliantContact:
         kick: float = 1e-7,
         seed: int = 0,
     ) -> None:
-        self.layout = layout
+        self.layout: Layout = instance("layout", layout, Layout, "a Layout")
         self.balloons = balloons_of(balloon, layout)
         for name, value in (("kz", kz), ("kxy", kxy), ("kc", kc), ("kbase", kbase)):
             positive(name, number(name, value), "N/m")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bubbleskin.checks import finite, number, positive
+from bubbleskin.checks import finite, instance, number, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 
@@ -40,7 +40,7 @@ class RigidContact:
     """
 
     def __init__(self, layout: Layout, rest_radius_mm: float = 2.5) -> None:
-        self.layout = layout
+        self.layout: Layout = instance("layout", layout, Layout, "a Layout")
         positive("rest_radius_mm", number("rest_radius_mm", rest_radius_mm), "mm")
         self.rest_radius_mm = float(rest_radius_mm)
         gap = layout.positions_mm[:, None] - layout.positions_mm[None]

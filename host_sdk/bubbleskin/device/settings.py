@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bubble_protocol.schema.settings import SETTINGS
+from bubbleskin.checks import number
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.message import Message
 
@@ -49,8 +50,7 @@ def changes(wanted: Mapping[str, float], allowed: Mapping[str, Setting]) -> list
         if name not in allowed:
             raise InvalidInput(f"There is no setting {name!r}; there are {', '.join(allowed)}.")
         limits = allowed[name]
-        if not isinstance(value, int | float) or not math.isfinite(value) or not limits.low <= value <= limits.high:
-            raise InvalidInput(f"{name} is {value!r}; {limits.low:g} to {limits.high:g} is allowed on this wristband.")
+        value = number(name, value, limits.low, limits.high)
         wire, unit = NAMES[name]
         rows.append((_NUMBERS[wire], round(value / unit)))
         values[name] = value

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bubble_protocol.schema import messages
+from bubbleskin.checks import instance
 from bubbleskin.device.info import Info
 from bubbleskin.errors import DeviceRefused, InvalidInput
 from bubbleskin.link.framing import crc32
@@ -27,14 +28,20 @@ APART_MOST = 1.5
 def one_per_bubble(tables: "Sequence[Table] | Table | Calibration", info: Info) -> "list[Table]":
     """A table for each bubble of this device. `InvalidInput` where there are more or fewer, or they are another board's."""
     from bubbleskin.membrane.calibration import Calibration
+    from bubbleskin.membrane.table import Table
 
     if isinstance(tables, Calibration):
         if tables.board != info.board:
             raise InvalidInput(f"The calibration is of a {tables.board}; this is a {info.board}.")
         tables = tables.tables
-    each = list(tables) if isinstance(tables, Sequence) else [tables] * info.bubbles
-    if len(each) != info.bubbles:
-        raise InvalidInput(f"{len(each)} tables for {info.bubbles} bubbles: give one per bubble, or one for all.")
+    count = len(tables) if isinstance(tables, Sequence) and not isinstance(tables, str) else None
+    if count not in (None, info.bubbles):
+        raise InvalidInput(f"{count} tables for {info.bubbles} bubbles: give one per bubble, or one for all.")
+    each: list[Table] = [tables] * info.bubbles if count is None else list(tables)  # type: ignore[list-item, arg-type]
+    for table in each:
+        instance(
+            "tables", table, Table, "a Table, one per bubble, or a Calibration; of a balloon: build_table(balloon)"
+        )
     return each
 
 

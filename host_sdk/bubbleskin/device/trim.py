@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubble_protocol import codec, frame
+from bubbleskin.checks import finite
 from bubbleskin.errors import InvalidInput
 from bubbleskin.link.message import Message
 
@@ -81,12 +82,12 @@ class Trim:
             values = getattr(self, name)
             if values is None:
                 values = np.full(bubbles, _UNKNOWN[name]) if name in _UNKNOWN else getattr(self, name[len("vent_") :])
-            values = np.asarray(values)
+            values = finite(name, values)
             if values.shape != (bubbles,):
                 raise InvalidInput(
                     f"{name} has the shape {values.shape}; give one number for each of {bubbles} bubbles."
                 )
-            if not (np.isfinite(values).all() and (values == np.rint(values)).all()):
+            if not (values == np.rint(values)).all():
                 raise InvalidInput(f"{name} must be whole numbers; {values.tolist()} are not.")
             if (values < 0).any() or (values > 65535).any():
                 raise InvalidInput(f"{name} is {values.tolist()}; numbers from 0 to 65535 are allowed.")

@@ -11,6 +11,7 @@ from pathlib import Path
 import crcmod
 
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import read_bytes
 
 BLOCK, PAGE = 512, 256
 HEADER = struct.Struct("<8I")
@@ -67,11 +68,7 @@ def starts(first_page: bytes) -> bool:
 
 def read(path: Path) -> Image:
     """The image in the file at `path`; `InvalidInput` where it is damaged, or not for this board."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InvalidInput(f"{path} cannot be read: {error.strerror}.") from None
-    return parse(data, str(path))
+    return parse(read_bytes(path, "the firmware"), str(path))
 
 
 def parse(data: bytes, name: str) -> Image:

@@ -52,6 +52,14 @@ def taken(request: Request, name: str) -> LinkError:
     return _of(request, LinkError(sentence))
 
 
+def other_process(name: str, opened: int, here: int) -> LinkError:
+    """A skin is used in a fork of the process that opened it."""
+    return LinkError(
+        f"The connection to {name} belongs to process {opened}; this is process {here}, forked from it. Nothing was sent. "
+        "Connect in this process, once the other one has closed its own, or send what to do to that one."
+    )
+
+
 def no_wristband(name: str, patience: float, heard: bool) -> WrongDevice:
     """What is at `name` has not answered HELLO within `patience` seconds; `heard`: it sends something."""
     what = "It sends data, but not ours." if heard else "It says nothing at all."

@@ -14,6 +14,8 @@ from bubble_protocol.schema import messages
 _DELIMITER = b"\0"
 _DISTANCES = bytes(range(1, 256)) + _DELIMITER
 """To the next zero, by the bytes in between."""
+FRAME_CONTENT = CONTENT_MAX - CRC
+"""Bytes of id, sequence number and payload in a frame at most."""
 _SHORTEST = 1 + HEADER + CRC
 _ABOUT_HELLO = (messages.HELLO, messages.HELLO | messages.REPLY)
 _REQUEST_AT = HEADER  # in the content of an ERROR: the message that it refuses
@@ -28,8 +30,8 @@ def crc32(data: bytes | bytearray | memoryview) -> int:
 
 def enclose(content: bytes, key: bytes) -> bytes:
     """The frame around id, sequence number and payload, with the CRC that belongs to the session of `key`."""
-    if len(content) > CONTENT_MAX - CRC:
-        raise ValueError(f"{len(content) - HEADER} bytes of payload; a frame takes {CONTENT_MAX - CRC - HEADER}")
+    if len(content) > FRAME_CONTENT:
+        raise ValueError(f"{len(content) - HEADER} bytes of payload; a frame takes {FRAME_CONTENT - HEADER}")
     crc = _crc32(content)
     if not _is_about_hello(content):
         crc ^= int.from_bytes(key, "little")

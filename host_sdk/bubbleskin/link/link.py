@@ -5,6 +5,7 @@ import contextlib
 import logging
 import math
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
@@ -18,6 +19,7 @@ from bubbleskin.link.handshake import Handshake, is_accepted
 from bubbleskin.link.keepalive import KEEP_ALIVE, Keeper, Pings, Serviced, TaskKeeper, ThreadKeeper
 from bubbleskin.link.line import SLICE, Line
 from bubbleskin.link.message import Message, name_of
+from bubbleskin.link.process import Owner
 from bubbleskin.link.reader import Reader
 from bubbleskin.link.refusals import describe_refusal
 from bubbleskin.link.rtt import RttEstimator
@@ -63,6 +65,8 @@ class Link(Serviced):
         """A restart that was asked for is not told as one that was not."""
         self.closed = False
         self.open = False
+        self.warns = False
+        """Whether it says so when nobody holds it any more and nobody has closed it."""
         # Threads of a script take turns, and the one that keeps the link alive has its own between calls. Tasks need none.
         self.guard: Any = contextlib.nullcontext() if event_loop else threading.RLock()
         self._event_loop = event_loop
@@ -78,6 +82,15 @@ class Link(Serviced):
         self._sent_at = 0.0
         self._opening = asyncio.Lock()
         self._keeper: Keeper | None = None
+        self._owner = Owner(transport)
+
+    def __del__(self) -> None:
+        if getattr(self, "warns", False) and self.open and not self._owner.left_behind:
+            warnings.warn(
+                f"{self.transport.name} was not closed; use it in a with block.", ResourceWarning, stacklevel=2
+            )
+            with contextlib.suppress(Exception):
+                self.transport.close()
 
     @property
     def session(self) -> int:
@@ -88,6 +101,7 @@ class Link(Serviced):
 
     async def hello(self) -> Message:
         """Open a session. `WrongDevice` where there is no wristband, or one we cannot talk to."""
+        self._owner.check()
         with self.guard:
             try:
                 return await self._open(self.transport.now() + self.timeout)
@@ -111,6 +125,7 @@ class Link(Serviced):
         whether the request may have been applied. `DeviceRestarted` where the device has forgotten everything.
         Where several have failed, the first one's error is raised.
         """
+        self._owner.check()
         with self.guard:
             patience = self.timeout if timeout is None else timeout
             deadline = self.transport.now() + patience
@@ -143,6 +158,7 @@ class Link(Serviced):
 
     async def wait(self, until: float, done: Callable[[], bool] = lambda: False) -> None:
         """Take what comes until `done()`, or the transport's clock stands at `until`, s; keep the link alive meanwhile."""
+        self._owner.check()
         with self.guard:
             while not done() and (now := self.transport.now()) < until:
                 self._service(now)
@@ -152,6 +168,8 @@ class Link(Serviced):
         """Let go of the transport."""
         self.closed = True
         self.open = False
+        if self._owner.left_behind:
+            return
         self._line.keep = False
         try:
             if self._keeper:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from bubble_protocol import codec
 from bubble_protocol.frame import FRAME_MAX, NO_KEY
+from bubbleskin.checks import shown
+from bubbleskin.errors import InvalidInput
 from bubbleskin.link.framing import crc32, enclose
 from bubbleskin.link.struct_codec import BY_NAME
 
@@ -51,16 +53,40 @@ def encode(
     key: bytes = NO_KEY,
 ) -> bytes:
     """The frame of one message: `fixed` fields in the schema's order, `repeated` rows likewise; `key` of `session_key`."""
+    return enclose(pack(name, sequence, fixed, repeated), key)
+
+
+def pack(name: str, sequence: int, fixed: Sequence[int], repeated: Sequence[Sequence[int]]) -> bytes:
+    """Id, sequence number and payload of one message. `InvalidInput` for values that no message can have."""
     struct_codec = BY_NAME[name]
+    if not (hasattr(fixed, "__len__") and hasattr(repeated, "__len__")) or len(repeated) > FRAME_MAX:
+        raise InvalidInput(f"{name} takes numbers and a few rows of them, not {shown(repeated)}.")
     try:
-        content = struct_codec.pack(sequence, fixed, repeated)
-    except struct.error:  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
+        return struct_codec.pack(sequence, fixed, repeated)
+    except (
+        struct.error,
+        TypeError,
+    ):  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
         message = struct_codec.message
-        values = array("i", map(signed_word, chain(fixed, *repeated)))
-        payload = bytearray(FRAME_MAX)
+        try:
+            given = list(chain(fixed, *repeated))
+        except TypeError:
+            raise InvalidInput(f"{name} takes rows of numbers, not {shown(repeated)}.") from None
+        wanted = message.fixed_values + len(repeated) * message.stride_values
+        if len(given) != wanted:
+            raise InvalidInput(f"{name} takes {wanted} values, not {len(given)}.") from None
+        for value in given:
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or isinstance(value, np.timedelta64):
+                raise InvalidInput(f"{name} takes whole numbers; {shown(value)} is none.") from None
+        values = array("i", map(signed_word, given))
+        payload = bytearray(max(FRAME_MAX, 4 * wanted))
         end = message.pack(values, len(repeated), payload, 0)
-        content = struct.pack("<BH", message.id, sequence & 0xFFFF) + payload[:end]
-    return enclose(content, key)
+        return struct.pack("<BH", message.id, sequence & 0xFFFF) + payload[:end]
+
+
+def numbered(content: bytes, sequence: int, key: bytes) -> bytes:
+    """The frame of what `pack` made, under another sequence number."""
+    return enclose(content[:1] + sequence.to_bytes(2, "little") + content[3:], key)
 
 
 def signed_word(value: int) -> int:

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field
 from bubble_protocol import codec
 from bubble_protocol.frame import NO_KEY
 from bubble_protocol.schema import messages, system
-from bubbleskin.errors import BubbleskinError, Overtaken
-from bubbleskin.link.message import Message, encode
+from bubbleskin.checks import shown
+from bubbleskin.errors import BubbleskinError, InvalidInput, Overtaken
+from bubbleskin.link.framing import FRAME_CONTENT
+from bubbleskin.link.message import Message, numbered, pack
 from bubbleskin.link.rtt import RttEstimator
 
 _log = logging.getLogger(__name__)
@@ -51,9 +53,18 @@ class Request:
     reply: Message | None = None
     error: BubbleskinError | None = None
     id: int = field(init=False)
+    content: bytes = field(init=False)
+    """Packed before it has a place or a number: what cannot be packed is refused, and nothing else hears of it."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or self.name not in codec.BY_NAME:
+            raise InvalidInput(f"There is no request {shown(self.name)}; they stand in the protocol's page.")
         self.id = codec.BY_NAME[self.name].id
+        self.content = pack(self.name, 0, self.fixed, self.repeated)
+        if len(self.content) > FRAME_CONTENT:
+            raise InvalidInput(
+                f"{self.name} with {len(self.repeated)} rows has {len(self.content)} bytes; a frame takes {FRAME_CONTENT}."
+            )
 
     @property
     def done(self) -> bool:
@@ -113,7 +124,7 @@ class SendWindow:
             request.number = self.next_number
             self.next_number += 1
             sequence = request.number & 0xFFFF
-            request.frame = encode(request.name, sequence, request.fixed, request.repeated, self.key)
+            request.frame = numbered(request.content, sequence, self.key)
             request.sent = now
             request.patience = self._rtt.timeout
             self._flight[sequence] = request

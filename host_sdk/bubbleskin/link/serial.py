@@ -146,6 +146,15 @@ class SerialTransport(Transport):
         if left:
             left.close()
 
+    def leave_behind(self) -> None:
+        """See `Transport`. A socket is closed, not shut down: that would end the connection of the first process."""
+        left = getattr(self._port, "_socket", None)
+        if left:
+            left.close()
+            self._port.is_open = False
+        else:
+            self.close()
+
 
 class Attempt:
     """Something that may take long and fail, tried in a thread."""

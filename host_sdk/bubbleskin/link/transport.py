@@ -32,6 +32,10 @@ class Transport(ABC):
     def close(self) -> None:
         """Let go of the device."""
 
+    def leave_behind(self) -> None:
+        """Let go of this process's copy after a fork, without the other end or the first process noticing."""
+        return  # a transport that holds no port has nothing to let go of
+
     @property
     def behind(self) -> float:
         """Seconds of `now` that reading has to catch up with, because nobody has read for a while."""

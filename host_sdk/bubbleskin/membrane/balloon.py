@@ -25,6 +25,9 @@ ATMOSPHERE = 101_325.0
 MAX_STRETCH = 10.0
 """Equilibria are looked for up to here: Ecoflex 00-30 breaks at 900 % elongation (data sheet)."""
 
+_UNLIKELY = 100.0
+"""Times the rest height: who asks for more has taken mm for m."""
+
 Wall = Literal["thin", "thick"]
 Surface = Literal["mid", "inner", "outer"]
 
@@ -229,6 +232,11 @@ class YeohBalloon:
     def stretch_at_height(self, height: Numbers) -> Numbers:
         """Stretch of the named surface when the bubble is ``height`` (m) tall, from the rest height up."""
         h = positive("height", height, "m")
+        if np.any(h > _UNLIKELY * self.rest_height):
+            raise InvalidInput(
+                f"a height of {np.max(h):g} m is beyond every bubble. Heights are in m here: if {np.max(h):g} are mm, "
+                f"give {np.max(h) / 1e3:g}."
+            )
         if np.any(h < self.rest_height * (1 - 1e-9)):
             raise InvalidInput(
                 f"a height of {np.min(h) * 1e3:g} mm is below the rest height of "

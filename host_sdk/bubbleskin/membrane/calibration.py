@@ -8,7 +8,6 @@ all tables is the one that the firmware reports.
 from __future__ import annotations
 
 import json
-import tomllib
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from bubbleskin.checks import finite, shown
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import parse_toml, read_text, write_text
 from bubbleskin.membrane.balloon import YeohBalloon
 from bubbleskin.membrane.table import MAX_KNOTS, Table, build_table
 
@@ -109,21 +110,12 @@ class Calibration:
 
     def save(self, path: str | Path) -> None:
         """Write the calibration as text to ``path``."""
-        try:
-            Path(path).write_text(self.to_text(), encoding="utf-8")
-        except OSError as error:
-            raise InvalidInput(f"cannot write {path}: {error.strerror}.") from None
+        write_text(path, self.to_text(), "the calibration")
 
     @classmethod
     def load(cls, path: str | Path) -> Calibration:
         """Read what :meth:`save` wrote; raises ``InvalidInput`` saying what is wrong with the file."""
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except OSError as error:
-            raise InvalidInput(f"cannot read {path}: {error.strerror}.") from None
-        except UnicodeDecodeError:
-            raise InvalidInput(f"{path} is not text in UTF-8, so not a calibration file.") from None
-        return cls.from_text(text, name=str(path))
+        return cls.from_text(read_text(path, "the calibration"), name=str(path))
 
     def to_text(self) -> str:
         """The file's text."""
@@ -149,13 +141,10 @@ class Calibration:
     @classmethod
     def from_text(cls, text: str, *, name: str = "calibration") -> Calibration:
         """The calibration that :meth:`to_text` wrote."""
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise InvalidInput(f"{name} is not readable: {error}.") from None
+        data = parse_toml(text, name)
         if data.get("schema") != SCHEMA:
             raise InvalidInput(
-                f"{name} has schema {data.get('schema')}, but this version reads schema {SCHEMA}: make it "
+                f"{name} has schema {shown(data.get('schema'))}, but this version reads schema {SCHEMA}: make it "
                 "again with 'bubbleskin table'."
             )
         bubbles = data.get("bubble")
@@ -163,20 +152,20 @@ class Calibration:
             raise InvalidInput(f"{name} has no [[bubble]] in it.")
         tables = []
         for number, bubble in enumerate(bubbles):
-            if bubble.get("number") != number:
+            stands = bubble.get("number") if isinstance(bubble, dict) else None
+            if stands != number or isinstance(stands, bool):
                 raise InvalidInput(
-                    f"{name}: bubbles must be numbered 0, 1, 2, ... in this order; "
-                    f"where {number} is due stands {bubble.get('number')}."
+                    f"{name}: bubbles must be numbered 0, 1, 2, ... in this order; where {number} is due stands {shown(stands)}."
                 )
             try:
                 tables.append(_table(bubble))
-            except (InvalidInput, TypeError, ValueError) as error:
+            except InvalidInput as error:
                 raise InvalidInput(f"{name}, bubble {number}: {error}") from None
         found = cls(str(data.get("board", "")), tuple(tables), str(data.get("source", "")))
         stated = data.get("crc32")
         if stated is not None and stated != f"{found.crc32:08x}":
             raise InvalidInput(
-                f"{name}: its knots have CRC-32 {found.crc32:08x}, but it says {stated}. If you edited "
+                f"{name}: its knots have CRC-32 {found.crc32:08x}, but it says {shown(stated)}. If you edited "
                 "them by hand, delete the line crc32; otherwise the file is damaged."
             )
         return found
@@ -209,7 +198,7 @@ def _constants(balloon: YeohBalloon | None) -> list[str]:
 
 
 def _table(bubble: dict[str, Any]) -> Table:
-    knots = np.asarray(bubble.get("knots", []))
+    knots = finite("knots", bubble.get("knots", []))
     if knots.ndim != 2 or knots.shape[1] != 2:
         raise InvalidInput("knots must be rows of [height in µm, pressure in Pa].")
     balloon = None

@@ -6,13 +6,14 @@
 
 ``height`` and ``pressure`` must be there, each with its unit; ``bubble`` (a whole number, 0 if absent),
 ``step`` (the setting; rows of one bubble with the same step are repeats), ``height_sd`` and ``pressure_sd``
-may be. Lines that begin with # and empty lines are passed over. Columns are parted by commas, semicolons or
-tabs; with semicolons a decimal comma is understood.
+may be. Units may stand in a row below the header instead. How the table itself may look is for ``bubbleskin.files`` to say.
+
+Numbers of bubbles are their identity: they are kept, from the file to the device. They count from 0; a file that counts
+from 1 is read with ``first=1``.
 """
 
 from __future__ import annotations
 
-import math
 import re
 import warnings
 from collections.abc import Iterable
@@ -21,7 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
+from bubbleskin.checks import flag, whole
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import Cell, CellError, Grid, read_table, width, write_text
 
 UNITS = {
     "height": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6},
@@ -32,6 +35,7 @@ UNITS = {
 }  # fmt: skip
 NUMBERED = ("bubble", "step")
 MEASURED = ("height", "pressure", "height_sd", "pressure_sd")
+_NUMBER_MAX = 1_000_000  # of a bubble or a step
 _HEADING = re.compile(r"^(?P<name>[a-z_]+?)\s*(?:[\[(]\s*(?P<unit>\S+?)\s*[\])]|_(?P<tail>[a-zµμ]+))?$", re.I)
 
 
@@ -76,51 +80,41 @@ class BadRowWarning(UserWarning):
     """Rows of a file were left out."""
 
 
-def read_csv(path: str | Path, *, skip_bad_rows: bool = False) -> Measurements:
+def read_csv(path: str | Path, *, skip_bad_rows: bool = False, first: int = 0) -> Measurements:
     """Read measurements from the file ``path``, in the format that this module's text shows.
 
-    Raises ``InvalidInput`` with the line numbers of all bad rows; with ``skip_bad_rows`` they are left out
-    and named in a :class:`BadRowWarning` instead.
+    ``first`` is the number that the file gives to what is bubble 0 here. Raises ``InvalidInput`` with the line numbers of all
+    bad rows; with ``skip_bad_rows`` they are left out and named in a :class:`BadRowWarning` instead.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InvalidInput(f"cannot read {path}: {error.strerror}.") from None
-    except UnicodeDecodeError:
-        raise InvalidInput(f"{path} is not text in UTF-8: save it as CSV.") from None
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise InvalidInput(f"{path} holds no measurements.")
-    separator = next((c for c in (";", "\t") if c in lines[0][1]), ",")
-    columns = _heading(path, lines[0][1].split(separator))
+    flag("skip_bad_rows", skip_bad_rows)
+    first = whole("first", first, 0, 1)
+    table = read_table(path, "the measurements")
+    if not table.rows:
+        raise InvalidInput(f"{table.name} holds no measurements.")
+    columns, below = _columns(table)
     rows, bad = [], []
-    for number, line in lines[1:]:
+    for cells in below:
         try:
-            rows.append(_row(columns, [cell.strip() for cell in line.split(separator)], separator))
-        except ValueError as error:
-            bad.append(f"line {number}: {error}")
+            rows.append(_row(table, columns, cells, first))
+        except CellError as error:
+            bad.append(f"line {cells[0].line}: {error}")
     if bad:
         shown = "; ".join(bad[:5]) + (f"; and {len(bad) - 5} more" if len(bad) > 5 else "")
         if not skip_bad_rows:
-            raise InvalidInput(f"{path} has {len(bad)} bad row{'s' * (len(bad) > 1)}: {shown}.")
-        warnings.warn(f"left out of {path}: {shown}.", BadRowWarning, stacklevel=2)
+            raise InvalidInput(f"{table.name} has {len(bad)} bad row{'s' * (len(bad) > 1)}: {shown}.")
+        warnings.warn(f"left out of {table.name}: {shown}.", BadRowWarning, stacklevel=2)
     if not rows:
-        raise InvalidInput(f"{path} has a header but no usable row below it.")
+        raise InvalidInput(f"{table.name} has a header but no usable row below it.")
     values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     bubble = values.get("bubble", np.zeros(len(rows))).astype(int)
     step = values["step"].astype(int) if "step" in values else None
     sds = values.get("height_sd"), values.get("pressure_sd")
-    return Measurements(values["height"], values["pressure"], bubble, step, *sds, source=path.name)
+    return Measurements(values["height"], values["pressure"], bubble, step, *sds, source=Path(table.name).name)
 
 
 def write_csv(path: str | Path, measurements: Measurements, *, comments: Iterable[str] = ()) -> None:
     """Write ``measurements`` to ``path`` so that :func:`read_csv` reads them again; see :func:`to_csv`."""
-    Path(path).write_text(to_csv(measurements, comments=comments), encoding="utf-8")
+    write_text(path, to_csv(measurements, comments=comments), "the measurements")
 
 
 def to_csv(measurements: Measurements, *, comments: Iterable[str] = ()) -> str:
@@ -141,59 +135,94 @@ def to_csv(measurements: Measurements, *, comments: Iterable[str] = ()) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _heading(path: Path, cells: list[str]) -> list[tuple[str, float] | None]:
-    """Name and factor to SI of each column; None for one that is not ours."""
-    columns: list[tuple[str, float] | None] = []
-    for cell in (cell.strip().strip('"') for cell in cells):
-        match = _HEADING.match(cell.replace(" sd", "_sd"))
-        name, unit = (match["name"].lower(), match["unit"] or match["tail"]) if match else (cell.lower(), None)
-        if unit == "sd":
-            name, unit = f"{name}_sd", None
-        if name in NUMBERED:
-            columns.append((name, 1.0))
-        elif name in MEASURED:
-            known = UNITS[name.removesuffix("_sd")]
-            example = f"'{name} [{'mm' if name.startswith('height') else 'kPa'}]'"
-            if unit is None:
-                raise InvalidInput(f"{path}: the column {cell!r} has no unit; write it in the header, as {example}.")
-            if unit.lower() not in known or unit == "mPa":
+def _columns(table: Grid) -> tuple[list[tuple[str, float] | None], list[list[Cell]]]:
+    """Name and factor to SI of each column, None for one that is not ours; and the rows below header and units."""
+    header, *below = table.rows
+    names = [_heading(cell.text) for cell in header]
+    if below and len(below[0]) <= len(header) and all(_is_unit(cell.text) for cell in below[0]):
+        units, *below = below
+        for k, cell in enumerate(units):
+            name, unit = names[k]
+            if unit and cell.text and _factor(name, unit) != _factor(name, cell.text):
                 raise InvalidInput(
-                    f"{path}: {unit!r} in the column {cell!r} is no unit of {name.removesuffix('_sd')} known "
-                    f"here; there are {', '.join(known)}."
+                    f"{table.place(cell, header[k].text)}: the unit is {unit!r} in the header and {cell.text!r} here; keep one."
                 )
-            columns.append((name, known[unit.lower()]))
-        else:
-            columns.append(None)
-    names = [column[0] for column in columns if column]
+            names[k] = name, unit or cell.text or None
+    columns = [_column(table, cell.text, *named) for cell, named in zip(header, names, strict=True)]
+    found = [column[0] for column in columns if column]
     for name in ("height", "pressure"):
-        if names.count(name) != 1:
-            found = "none" if name not in names else str(names.count(name))
+        if found.count(name) != 1:
             raise InvalidInput(
-                f"{path} must have one column of {name} with its unit, such as "
-                f"'{name} [{'mm' if name == 'height' else 'kPa'}]'; it has {found}. "
-                f"Its header reads: {', '.join(cells)}."
+                f"{table.name} must have one column of {name} with its unit, such as {_example(name)}; it has "
+                f"{found.count(name) or 'none'}. Its header reads: {', '.join(cell.text for cell in header)[:200]}."
             )
-    return columns
+    for name in {name for name in found if found.count(name) > 1}:
+        raise InvalidInput(f"{table.name} has {found.count(name)} columns of {name}; keep one.")
+    return columns, below
 
 
-def _row(columns: list[tuple[str, float] | None], cells: list[str], separator: str) -> dict[str, float]:
-    """One row in SI; raises ValueError with the reason."""
-    if len(cells) != len(columns):
-        raise ValueError(f"{len(cells)} cells under {len(columns)} headings")
+def _heading(text: str) -> tuple[str, str | None]:
+    """Name and unit in one cell of a header."""
+    match = _HEADING.match(text.replace(" sd", "_sd"))
+    name, unit = (match["name"].lower(), match["unit"] or match["tail"]) if match else (text.lower(), None)
+    return (f"{name}_sd", None) if unit == "sd" else (name, unit)
+
+
+def _factor(name: str, unit: str) -> float | None:
+    """What one of this unit is in SI; None for a unit that is none of this quantity."""
+    known = UNITS.get(name.removesuffix("_sd"), {})
+    return None if unit == "mPa" else known.get(unit.strip("[]() ").lower())
+
+
+def _is_unit(text: str) -> bool:
+    return not text or any(_factor(name, text) for name in UNITS) or text in ("-", "#", "1")
+
+
+def _example(name: str) -> str:
+    return f"'{name} [{'mm' if name.startswith('height') else 'kPa'}]'"
+
+
+def _column(table: Grid, text: str, name: str, unit: str | None) -> tuple[str, float] | None:
+    if name in NUMBERED:
+        return name, 1.0
+    if name not in MEASURED:
+        return None
+    if unit is None:
+        raise InvalidInput(
+            f"{table.name}: the column {text!r} has no unit; write it in the header, as {_example(name)}."
+        )
+    factor = _factor(name, unit)
+    if factor is None:
+        quantity = name.removesuffix("_sd")
+        raise InvalidInput(
+            f"{table.name}: {unit!r} in the column {text!r} is no unit of {quantity} known here; "
+            f"there are {', '.join(UNITS[quantity])}."
+        )
+    return name, factor
+
+
+def _row(table: Grid, columns: list[tuple[str, float] | None], cells: list[Cell], first: int) -> dict[str, float]:
+    """One row in SI; raises `CellError` with the reason."""
+    if misfit := width(table, len(columns), cells):
+        raise CellError(misfit)
     row = {}
     for column, cell in zip(columns, cells, strict=True):
         if column is None:
             continue
         name, factor = column
+        if not cell.text:
+            raise CellError(f"{name} is missing")
         try:
-            value = float(cell.replace(",", ".") if separator == ";" else cell)
-        except ValueError:
-            raise ValueError(f"{name} is {cell!r}, not a number" if cell else f"{name} is missing") from None
-        if not math.isfinite(value):
-            raise ValueError(f"{name} is {cell}")
-        if name in NUMBERED and (value < 0 or value != int(value)):
-            raise ValueError(f"{name} is {cell}, not a whole number")
+            value = table.number(cell)
+        except CellError as error:
+            raise CellError(f"{name} {error}") from None
+        if name in NUMBERED and not (0 <= value <= _NUMBER_MAX and value == int(value)):
+            raise CellError(f"{name} is {cell.text}, not a whole number")
         if name in ("height", "height_sd", "pressure_sd") and value <= 0:
-            raise ValueError(f"{name} is {cell}, but must be above zero")
+            raise CellError(f"{name} is {cell.text}, but must be above zero")
+        if name == "bubble":
+            value -= first
+            if value < 0:
+                raise CellError(f"bubble is {cell.text}, and bubbles are said to count from {first}")
         row[name] = value * factor
     return row

@@ -28,6 +28,12 @@ LACK_OF_FIT_LEVEL = 0.01
 """Repeats that agree so improbably well speak against the model."""
 
 
+OUTLIERS_LIMIT = 0.2
+"""Share of the points: up to here the start of the fit is near the curve, whatever the outliers are."""
+STIFFNESS = (3e3, 5e6)
+"""Shear moduli (Pa) of silicone rubbers, from the softest gels to hard ones."""
+
+
 class Noise(NamedTuple):
     """What is known beforehand of the errors of measured points; scalars or one entry per point, (n,)."""
 
@@ -45,6 +51,10 @@ class IdentifiabilityWarning(UserWarning):
 
 class LackOfFitWarning(UserWarning):
     """Repeated measurements agree with each other much better than with the model."""
+
+
+class UnlikelyFitWarning(UserWarning):
+    """The constants are those of no rubber, or much of the data was left out."""
 
 
 class Parameters(NamedTuple):
@@ -226,6 +236,10 @@ def fit_yeoh(
             )
             notes.append(note)
             warnings.warn(note, LackOfFitWarning, stacklevel=2)
+    for doubt in (_unlikely_units(float(solution.theta[0])), _many_outliers(solution.weights == 0)):
+        if doubt:
+            notes.append(doubt)
+            warnings.warn(doubt, UnlikelyFitWarning, stacklevel=2)
     covariance = variance * inverse(linear.design.T @ (linear.design * solution.weights[:, None]))
     fit = replace(make_fit(dimensions, points, solution, covariance, dof), repeats=repeats, notes=tuple(notes))
     condition = float(np.linalg.cond(linear.design / np.linalg.norm(linear.design, axis=0)))
@@ -234,6 +248,28 @@ def fit_yeoh(
         warnings.warn(doubt, IdentifiabilityWarning, stacklevel=2)
         fit = replace(fit, notes=(*fit.notes, doubt))
     return fit
+
+
+def _unlikely_units(mu: float) -> str:
+    """A sentence where μ is no rubber's, with what was probably meant."""
+    if STIFFNESS[0] <= mu <= STIFFNESS[1]:
+        return ""
+    meant = [unit for unit, factor in (("mbar", 100), ("kPa", 1000), ("MPa", 1e6)) if 1e4 <= mu * factor <= 1e6]
+    guess = f"if they were {meant[0]}, say so or convert them" if meant and mu < STIFFNESS[0] else "look at their units"
+    return (
+        f"mu = {mu:.3g} Pa is the shear modulus of no silicone rubber (some kPa to some MPa). Pressures are taken in Pa and "
+        f"heights in m: {guess}."
+    )
+
+
+def _many_outliers(outliers: np.ndarray) -> str:
+    share = float(np.mean(outliers))
+    if share <= OUTLIERS_LIMIT:
+        return ""
+    return (
+        f"{100 * share:.0f} % of the points were left out as outliers; with more than {100 * OUTLIERS_LIMIT:.0f} % nobody knows "
+        "which are the good ones. Look at the picture."
+    )
 
 
 def as_points(height: Any, pressure: Any, noise: Noise) -> Points:

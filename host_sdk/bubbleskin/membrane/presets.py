@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from bubbleskin.checks import shown
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import YeohBalloon
 
@@ -45,6 +46,6 @@ PRESETS: dict[str, Preset] = {
 
 def preset(name: str) -> YeohBalloon:
     """The balloon of the preset ``name``; its source is ``PRESETS[name].source``."""
-    if name not in PRESETS:
-        raise InvalidInput(f"there is no preset {name!r}; there are {', '.join(PRESETS)}.")
+    if not isinstance(name, str) or name not in PRESETS:
+        raise InvalidInput(f"there is no preset {shown(name)}; there are {', '.join(PRESETS)}.")
     return PRESETS[name].balloon

@@ -4,7 +4,7 @@ The pressure is linear in θ = (μ, C2, C3), so each pass is a linear least-squa
 enters by projection: every point is moved to the nearest place η on the curve, near in units of its own
 noise, and its pressure is carried there along the tangent (orthogonal distance regression, Boggs and
 Rogers 1990, for a model that is linear in its constants). Outliers are weighed down by Tukey's bisquare
-around a start that half the points cannot spoil (an MM estimate, Yohai 1987).
+around a start that a fifth of the points cannot spoil (an MM estimate, Yohai 1987).
 """
 
 from __future__ import annotations

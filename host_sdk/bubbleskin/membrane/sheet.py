@@ -84,7 +84,19 @@ class SheetFit(Mapping[int, YeohFit]):
 
     @property
     def balloons(self) -> list[YeohBalloon]:
-        """The fitted balloons in the order of the bubble numbers."""
+        """The fitted balloons: entry i is bubble i. Raises ``InvalidInput`` where a bubble has not been measured."""
+        missing = sorted(set(range(max(self.fits) + 1)) - set(self.fits))
+        if missing == [0]:
+            raise InvalidInput(
+                f"the bubbles measured are numbered 1 to {max(self.fits)}, and bubbles count from 0. If the file counts from 1, "
+                "read it with first=1 (--first 1): its bubble 1 is then bubble 0."
+            )
+        if missing:
+            raise InvalidInput(
+                f"bubble{'s' * (len(missing) > 1)} {', '.join(map(str, missing))} of {max(self.fits) + 1} "
+                f"{'have' if len(missing) > 1 else 'has'} no measurements, and no other can stand in. Measure all, or fit them "
+                "--pooled as one curve for all."
+            )
         return [fit.balloon for fit in self.fits.values()]
 
     def report(self) -> str:

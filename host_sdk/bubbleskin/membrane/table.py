@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bubbleskin.checks import finite
+from bubbleskin.checks import finite, instance, shown, whole
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import YeohBalloon
 
@@ -178,9 +178,12 @@ def build_table(balloon: YeohBalloon, *, height_mm: tuple[float, float] = (5.0, 
     the tolerance being the looser of 2 Pa and 5 µm, and they lie off the curve by half a segment's error,
     which halves it. Raises ``InvalidInput`` if the range is empty or needs more than 65535 Pa.
     """
-    if not 2 <= knots <= MAX_KNOTS:
-        raise InvalidInput(f"a table has 2 to {MAX_KNOTS} knots, not {knots}.")
-    low_mm, high_mm = finite("height_mm", height_mm)
+    instance("balloon", balloon, YeohBalloon, "a YeohBalloon")
+    knots = whole("knots", knots, 2, MAX_KNOTS)
+    ends = finite("height_mm", height_mm)
+    if ends.shape != (2,):
+        raise InvalidInput(f"height_mm is {shown(height_mm)}; give two heights, such as (5.0, 14.0).")
+    low_mm, high_mm = (float(end) for end in np.clip(ends, -1e6, 1e6))
     first, last = _rest_um(balloon), round(high_mm * 1000)
     low = max(round(low_mm * 1000), first)
     if last - low < knots or last > MAX_HEIGHT:

@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.checks import number, positive
+from bubbleskin.checks import instance, number, positive
 from bubbleskin.contact.continuation import FINE, Resolution
 from bubbleskin.contact.model import CompliantContact, Shape, balloons_of
 from bubbleskin.errors import InvalidInput
@@ -58,6 +58,7 @@ def plan(
 
     Raises `InvalidInput` for heights that are no heights, and for a model of another layout.
     """
+    instance("layout", layout, Layout, "a Layout, such as skin.layout or Layout.hexagon()")
     model = _model_of(layout, balloon, contact)
     positive("limit_mm", number("limit_mm", limit_mm), "mm")
     positive("tolerance_mm", number("tolerance_mm", tolerance_mm), "mm")

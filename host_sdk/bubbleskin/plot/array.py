@@ -12,6 +12,7 @@ from matplotlib.patches import Circle
 
 from bubbleskin.demo import Show
 from bubbleskin.layout import Layout
+from bubbleskin.plot.save import save
 
 _COLOURS = "viridis"
 
@@ -32,7 +33,7 @@ def draw_shows(path: str | Path, layout: Layout, shows: Sequence[Show], limits_m
         _over_time(row[2], layout, states)
         row[0].set_title(title, loc="left", fontweight="bold")
     figure.colorbar(colours, ax=axes[:, 0], label="height (mm)", location="left", shrink=0.8)
-    figure.savefig(path, dpi=130)
+    save(figure, path, dpi=130)
     return Path(path)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from bubbleskin.membrane.fit import HEIGHT_SD, PRESSURE_SD, YeohFit, fit_yeoh
 from bubbleskin.membrane.sheet import SheetFit, fit_sheet
 from bubbleskin.membrane.synthetic import simulate_sheet
 from bubbleskin.membrane.table import HEIGHT_TOLERANCE, PRESSURE_TOLERANCE, Table
+from bubbleskin.plot.save import save as save
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195")
 MARKERS = "osD^vP*"
@@ -138,14 +138,6 @@ def figure_6(*, seed: int = 6) -> tuple[Figure, Measurements]:
     fit = fit_sheet(measurements.bubble, measurements.height, measurements.pressure)
     title = "Seven bubbles of one sheet (simulated measurements)"
     return plot_fit(fit, measurements, title=title), measurements
-
-
-def save(figure: Figure, path: str | Path) -> None:
-    """Write a picture in the format that the ending of ``path`` names (png, svg, pdf)."""
-    try:
-        figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"cannot write the picture {path}: {error}.") from None
 
 
 def draw_curve(

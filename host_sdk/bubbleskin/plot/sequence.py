@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import guarded, path_of
 from bubbleskin.layout import Layout
 from bubbleskin.plot.contact import Above, Side, colours
 from bubbleskin.plot.membrane import STYLE
@@ -82,7 +83,7 @@ def animate(
 
     The ending says which: .gif, or .mp4, which needs ffmpeg. `progress` is called with the frames done so far.
     """
-    path = Path(path)
+    path = path_of(path, "the film")
     if len(frames) < 2:
         raise InvalidInput("A film needs at least two frames: give the sequence more time.")
     if path.suffix not in (".gif", ".mp4"):
@@ -95,14 +96,11 @@ def animate(
     writer = make(fps=rate)
     with rc_context(STYLE):
         picture = _Picture(layout)
-        try:
-            with writer.saving(picture, str(path), _DPI):
-                for done, frame in enumerate(frames, 1):
-                    picture.draw_frame(frame, f"{title}  {frame.time:.1f} s".strip())
-                    writer.grab_frame()
-                    progress(done)
-        except OSError as error:
-            raise InvalidInput(f"Cannot write the film {path}: {error.strerror}.") from None
+        with guarded(path, "the film"), writer.saving(picture, str(path), _DPI):
+            for done, frame in enumerate(frames, 1):
+                picture.draw_frame(frame, f"{title}  {frame.time:.1f} s".strip())
+                writer.grab_frame()
+                progress(done)
     return path
 
 

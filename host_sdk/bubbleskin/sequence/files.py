@@ -1,15 +1,15 @@
 """Sequences in files: JSON by `sequence.schema.json`, and timelines as CSV."""
 
-import csv
 import json
+import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-import numpy as np
-
+from bubbleskin.checks import shown
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import Cell, CellError, Grid, parse_json, path_of, read_table, read_text, width, write_text
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.steps import STEPS_MAX, After, Repeat, Settled, Step
 
@@ -18,6 +18,8 @@ T = TypeVar("T")
 VERSION = 1
 SCHEMA = Path(__file__).with_name("sequence.schema.json")
 _NESTED = 32  # repeats in a file; more than `Sequence` takes, so that it may say so
+
+_TIME_MAX = 1e6  # s, of a timeline: eleven days
 
 _SEQUENCE = {"bubbleskin_sequence", "name", "board", "layout", "loops", "steps"}
 _LAYOUT = {"pitch_mm", "positions_mm"}
@@ -48,10 +50,7 @@ def to_json(written: Written, path: str | Path | None) -> str:
     head = json.dumps(data, ensure_ascii=False)[1:-1]
     text = f'{{\n  {head},\n  "steps": [\n    {lines}\n  ]\n}}\n'  # a line for each step
     if path is not None:
-        try:
-            Path(path).write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise InvalidInput(f"Cannot write {path}: {error.strerror}.") from None
+        write_text(path, text, "the sequence")
     return text
 
 
@@ -70,37 +69,27 @@ def _part(part: Step | Repeat) -> dict[str, Any]:
 
 def from_json(source: str | Path, make: Callable[[Written], T]) -> T:
     """See `bubbleskin.Sequence.from_json`; what `make` refuses is refused with the file's name."""
-    where = "The text"
-    text = str(source)
-    if isinstance(source, Path) or not text.lstrip().startswith("{"):
-        where, text = str(source), _read(source)
-    try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput(f"{where} is not JSON: {error}.") from None
+    if isinstance(source, str) and source.lstrip().startswith("{"):
+        where, text = "The text", source
+    else:
+        where, text = str(path_of(source, "the sequence")), read_text(source, "the sequence")
+    data = parse_json(text, where)
     try:
         return make(_written(data))
     except InvalidInput as error:
         raise InvalidInput(f"{where} is not a sequence that can be played. {error}") from None
 
 
-def _read(path: str | Path) -> str:
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InvalidInput(f"Cannot read the sequence {path}: {error.strerror}.") from None
-    except ValueError:
-        raise InvalidInput(f"{path} is not a text in UTF-8, so it is no sequence.") from None
-
-
 def _written(data: Any) -> Written:
     _known(data, _SEQUENCE, "The sequence")
     version = data.get("bubbleskin_sequence")
     if version != VERSION or isinstance(version, bool):
-        raise InvalidInput(f"bubbleskin_sequence, the version of the format, is {version!r}; this SDK reads {VERSION}.")
+        raise InvalidInput(
+            f"bubbleskin_sequence, the version of the format, is {shown(version)}; this SDK reads {VERSION}."
+        )
     for key in ("name", "board"):
         if not isinstance(data.get(key, ""), str):
-            raise InvalidInput(f"{key} is {data[key]!r}; it must be a text.")
+            raise InvalidInput(f"{key} is {shown(data[key])}; it must be a text.")
     return Written(
         _list(data.get("steps"), "steps", 0),
         loops=data.get("loops", 1),
@@ -115,14 +104,14 @@ def _layout(data: Any) -> Layout | None:
         return None
     _known(data, _LAYOUT, "layout")
     try:
-        return Layout(np.array(data.get("positions_mm"), dtype=float), float(data["pitch_mm"]))
-    except (TypeError, ValueError, KeyError) as error:
-        raise InvalidInput(f"layout is not one of pitch_mm and positions_mm: {error}.") from None
+        return Layout(data.get("positions_mm"), data.get("pitch_mm"))
+    except InvalidInput as error:
+        raise InvalidInput(f"layout is not one of pitch_mm and positions_mm: {error}") from None
 
 
 def _list(data: Any, where: str, depth: int) -> list[Step | Repeat]:
     if not isinstance(data, list):
-        raise InvalidInput(f"{where} is {data!r:.40}; it must be a list of steps and repeats.")
+        raise InvalidInput(f"{where} is {shown(data)}; it must be a list of steps and repeats.")
     if depth > _NESTED:
         raise InvalidInput(f"{where} is nested {depth} deep.")
     if len(data) > STEPS_MAX:
@@ -168,34 +157,28 @@ def _located(where: str, make: Callable[[], T]) -> T:
 
 def _known(data: Any, keys: set[str], where: str) -> None:
     if not isinstance(data, dict):
-        raise InvalidInput(f"{where} is {data!r:.40}; it must be an object with {', '.join(sorted(keys))}.")
+        raise InvalidInput(f"{where} is {shown(data)}; it must be an object with {', '.join(sorted(keys))}.")
     unknown = sorted(set(data) - keys)
     if unknown:
         raise InvalidInput(
-            f"{where} has {unknown[0]!r}, which means nothing there; known are {', '.join(sorted(keys))}."
+            f"{where} has {shown(unknown[0])}, which means nothing there; known are {', '.join(sorted(keys))}."
         )
 
 
 def steps_from_csv(path: str | Path, easing: str, lead: float) -> list[Step | Repeat]:
     """See `bubbleskin.Sequence.from_csv`."""
-    lines = csv.reader(_read(path).splitlines())
-    head = [name.strip() for name in next(lines, [])]
-    expected = ["time_s", *(f"b{bubble}" for bubble in range(len(head) - 1))]
-    if head != expected or len(head) < 2:
-        raise InvalidInput(
-            f"{path} begins with the columns {','.join(head)}; a timeline has {','.join(expected[:3])} and so on."
-        )
+    table = read_table(path, "the timeline")
+    head, *rows = table.rows or [[]]
+    order = _bubbles(table, [cell.text for cell in head])
     steps: list[Step | Repeat] = []
     before = 0  # ms
-    for number, row in enumerate(lines, start=2):
-        if not any(cell.strip() for cell in row):
-            continue
-        where = f"{path}, line {number}"
-        if len(row) != len(head):
-            raise InvalidInput(f"{where} has {len(row)} cells; there are {len(head)} columns.")
-        time, *heights = (_cell(cell, where) for cell in row)
-        if time is None or time < 0:
-            raise InvalidInput(f"{where} has no time; time_s is in seconds from 0.")
+    for row in rows:
+        where = f"{table.name}, line {row[0].line}"
+        if misfit := width(table, len(head), row):
+            raise InvalidInput(f"{where} has {misfit}.")
+        time, *heights = (_cell(table, cell, name.text) for cell, name in zip(row, head, strict=True))
+        if time is None or not 0 <= time <= _TIME_MAX:
+            raise InvalidInput(f"{where} has no time; time_s is in seconds from 0 to {_TIME_MAX:g}.")
         now = round(time * 1000)  # of the sum, so that rounding does not add up
         if steps and now <= before:
             raise InvalidInput(
@@ -203,16 +186,38 @@ def steps_from_csv(path: str | Path, easing: str, lead: float) -> list[Step | Re
             )
         ramp = (now - before) / 1000 if now else lead
         before = now
-        steps.append(_located(where, partial(Step, heights, ramp, easing)))
+        steps.append(_located(where, partial(Step, [heights[k] for k in order], ramp, easing)))
     if not steps:
-        raise InvalidInput(f"{path} has no rows below its header; a timeline needs at least one.")
+        raise InvalidInput(f"{table.name} has no rows below its header; a timeline needs at least one.")
     return steps
 
 
-def _cell(text: str, where: str) -> float | None:
-    if not text.strip():
+def _bubbles(table: Grid, head: list[str]) -> list[int]:
+    """In which column after the first each bubble stands. The columns' names say so; their order does not matter."""
+    names = head[1:]
+    expected = [f"b{bubble}" for bubble in range(len(names))]
+    if head[:1] != ["time_s"] or not names or not all(re.fullmatch(r"b\d{1,4}", name, re.ASCII) for name in names):
+        raise InvalidInput(
+            f"{table.name} begins with the columns {','.join(head)[:200]}; a timeline has time_s,b0,b1 and so on."
+        )
+    numbers = [int(name[1:]) for name in names]
+    if sorted(numbers) == list(range(1, len(names) + 1)):
+        raise InvalidInput(
+            f"{table.name} has the columns b1 to b{len(names)}, and bubbles count from 0: name them b0 to b{len(names) - 1}."
+        )
+    missing = [name for name in expected if name not in names]
+    if missing or len(set(names)) < len(names):
+        raise InvalidInput(
+            f"{table.name} has no column {missing[0]}; {len(names)} bubbles are {expected[0]} to {expected[-1]}, each once. "
+            "A bubble that is to stay as it is has empty cells."
+        )
+    return [names.index(name) for name in expected]
+
+
+def _cell(table: Grid, cell: Cell, heading: str) -> float | None:
+    if not cell.text:
         return None
     try:
-        return float(text)
-    except ValueError:
-        raise InvalidInput(f"{where} has {text.strip()!r}, which is not a number.") from None
+        return table.number(cell)
+    except CellError as error:
+        raise InvalidInput(f"{table.place(cell, heading)}: it {error}.") from None

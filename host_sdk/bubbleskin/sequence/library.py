@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin.checks import above_zero, instance, number
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.model import Sequence
@@ -20,6 +21,7 @@ def rings(layout: Layout) -> list[NDArray[np.int64]]:
     The first is the bubble nearest to the middle, or those that are equally near. Bubbles without a way to it go by
     their distance in pitches.
     """
+    _check(layout)
     away = layout.positions_mm - layout.positions_mm.mean(axis=0)
     distance = np.linalg.norm(away, axis=1)
     ring = np.where(distance < distance.min() + 1e-3 * layout.pitch_mm, 0, -1)
@@ -77,7 +79,8 @@ def wave(
     loops: int = 3,
 ) -> Sequence:
     """A sine that travels in `direction_deg`, counterclockwise from the right. `wavelength_mm`: None is the layout's size."""
-    angle = np.deg2rad(direction_deg)
+    _check(layout)
+    angle = np.deg2rad(number("direction_deg", direction_deg))
     along = layout.positions_mm @ (np.cos(angle), np.sin(angle))
     length = _length(layout, wavelength_mm, np.ptp(along) + layout.pitch_mm)
     return _travelling(layout, along / length, low_mm, high_mm, period, loops, "wave")
@@ -93,6 +96,7 @@ def ripple(
     loops: int = 3,
 ) -> Sequence:
     """Rings that run outwards from the middle, as on water. `wavelength_mm`: None is the layout's radius."""
+    _check(layout)
     distance = np.linalg.norm(layout.positions_mm - layout.positions_mm.mean(axis=0), axis=1)
     length = _length(layout, wavelength_mm, distance.max() + layout.pitch_mm)
     return _travelling(layout, distance / length, low_mm, high_mm, period, loops, "ripple")
@@ -103,7 +107,7 @@ def breathing(
 ) -> Sequence:
     """All bubbles rise and fall together, smoothly; out takes longer than in, as of a sleeper."""
     low, high = _heights(layout, low_mm, high_mm)
-    _positive(period, "period")
+    period = above_zero("period", period, unit="s")
     steps = [
         Step(high, 0.4 * period, "smooth", After(0.05 * period), "in"),
         Step(low, 0.5 * period, "smooth", After(0.05 * period), "out"),
@@ -148,7 +152,7 @@ def _in_order(
         shape = shape.copy()
         shape[bubbles] = high[bubbles]
         steps.append(Step(shape, rise, "smooth", Settled(0.3, 2.0), layout.names(bubbles.tolist())))
-    if hold:
+    if number("hold", hold, 0.0):
         steps.append(Step(None, until=After(hold), name="hold"))
     return Sequence(steps, loops=loops, name=name, layout=layout)
 
@@ -158,7 +162,7 @@ def _travelling(
 ) -> Sequence:
     """sin 2π(t/T - phase), sampled often enough that straight ramps between the samples are within 2 % of it."""
     low, high = _heights(layout, low_mm, high_mm)
-    _positive(period, "period")
+    period = above_zero("period", period, unit="s")
     time = np.arange(1, _FRAMES + 1) / _FRAMES
     shapes = (low + high) / 2 + (high - low) / 2 * np.sin(2 * np.pi * (time[:, None] - phase))
     edges = np.rint(np.arange(_FRAMES + 1) * period * 1000 / _FRAMES) / 1000  # whole ms, whose sum is the period
@@ -171,7 +175,9 @@ def _travelling(
 
 
 def _heights(layout: Layout, low_mm: float, high_mm: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    if not (0 <= low_mm < high_mm < np.inf):
+    _check(layout)
+    low_mm, high_mm = number("low_mm", low_mm, 0.0), number("high_mm", high_mm, 0.0)
+    if low_mm >= high_mm:
         raise InvalidInput(f"Heights from {low_mm} to {high_mm} mm are asked; low must be 0 or more, and below high.")
     return np.full(len(layout), float(low_mm)), np.full(len(layout), float(high_mm))
 
@@ -179,10 +185,9 @@ def _heights(layout: Layout, low_mm: float, high_mm: float) -> tuple[NDArray[np.
 def _length(layout: Layout, asked: float | None, own: float) -> float:
     if asked is None:
         return own
-    _positive(asked, "wavelength_mm")
-    return asked
+    return above_zero("wavelength_mm", asked, unit="mm")
 
 
-def _positive(value: float, what: str) -> None:
-    if not 0 < value < np.inf:
-        raise InvalidInput(f"{what} is {value}; it must be positive.")
+def _check(layout: Layout) -> Layout:
+    """Refuse what is no layout before anything is asked of it."""
+    return instance("layout", layout, Layout, "a Layout, such as skin.layout or Layout.hexagon()")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bubble_protocol import steps as limits
+from bubbleskin.checks import array, instance, number, shown, text
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.sequence import files
@@ -52,9 +53,9 @@ class Sequence:
         """The steps and repeats as they are written."""
         check_times(loops, "A sequence")
         self.loops = loops
-        self.name = name
-        self.board = board
-        self.layout = layout
+        self.name = text("name", name)
+        self.board = None if board is None else text("board", board)
+        self.layout = None if layout is None else instance("layout", layout, Layout, "a Layout, or None")
         _check_depth(self.steps, loops)
         self.each = _steps_alone(self.steps)
         """The steps alone, in the order in which they are written: entry i is step i."""
@@ -142,7 +143,8 @@ class Sequence:
         Before it all are at `rest_mm`, which is also what lower targets mean; after it they stay. Steps that wait
         until settled are taken to be so at the end of their ramps.
         """
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = np.atleast_1d(array("t", t))
+        rest_mm = number("rest_mm", rest_mm, 0.0, unit="mm")
         if not np.isfinite(times).all():
             raise InvalidInput("Moments must be finite numbers of seconds; one is not.")
         heights = np.empty((len(times), self.bubbles))
@@ -203,7 +205,8 @@ class Sequence:
     @classmethod
     def load(cls, path: str | Path) -> "Sequence":
         """From a .json or .csv file, whichever it is."""
-        return cls.from_csv(path) if Path(path).suffix.lower() == ".csv" else cls.from_json(Path(path))
+        where = files.path_of(path, "the sequence")
+        return cls.from_csv(where) if where.suffix.lower() in (".csv", ".tsv", ".txt") else cls.from_json(where)
 
 
 class HasSequence(Protocol):
@@ -224,7 +227,8 @@ def playable(what: Playable) -> Sequence:
     sequence = what if isinstance(what, Sequence) else getattr(what, "sequence", None)
     if not isinstance(sequence, Sequence):
         raise InvalidInput(
-            f"{what!r:.60} cannot be played; give a Sequence, a plan, or the path of a .json or .csv file."
+            f"{shown(what)} cannot be played; give a Sequence, a plan, the path of a .json or .csv file, or a name of the "
+            "library, such as 'pulse'."
         )
     return sequence
 

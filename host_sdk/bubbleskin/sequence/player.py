@@ -2,10 +2,10 @@
 
 import contextlib
 import dataclasses
-import math
 
 from bubble_protocol.schema import sequences
 from bubble_protocol.schema.system import TICKS_WRAP
+from bubbleskin import checks
 from bubbleskin.device.health import Health
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State, bubbles_of
@@ -16,6 +16,7 @@ from bubbleskin.link.framing import crc32
 from bubbleskin.link.link import Link
 from bubbleskin.sequence.compile import Compiled
 from bubbleskin.sequence.event_log import REASONS, EventLog
+from bubbleskin.sequence.library import LIBRARY
 from bubbleskin.sequence.model import Playable, playable
 from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
 from bubbleskin.sequence.steps import Settled
@@ -40,7 +41,7 @@ class Player:
 
     async def start(self, what: Playable, at: float | None, *, follow: bool) -> Uploader:
         """Upload a sequence, arm and start it; `follow`: whether its rest can be sent while it plays. See `Skin.play`."""
-        sequence = playable(what)
+        sequence = LIBRARY[what](self._layout) if isinstance(what, str) and what in LIBRARY else playable(what)
         compiled = Compiled.of(sequence, self._info, self._layout)
         start = self._tick(at)
         link = self._link
@@ -63,7 +64,8 @@ class Player:
     def _tick(self, at: float | None) -> int:
         if at is None:
             return 0
-        if not (math.isfinite(at) and at > 0):
+        at = checks.number("at", at, unit="s")
+        if at <= 0:
             raise InvalidInput(
                 f"A sequence cannot start at {at} s; give a device time in s, as of `state().time`, or None."
             )

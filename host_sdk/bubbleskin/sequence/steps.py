@@ -1,6 +1,5 @@
 """What a sequence is made of: steps with targets, a ramp and a condition to go on, and repeats of them."""
 
-import math
 from collections.abc import Iterable, Iterator
 from collections.abc import Sequence as Items
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubble_protocol import steps as limits
+from bubbleskin.checks import number, one_of, shown
 from bubbleskin.errors import InvalidInput
 
 EASINGS = ("linear", "smooth", "in", "out")
@@ -25,24 +25,10 @@ _TARGET_MAX = (limits.LEAVE - 1) / 1000
 
 def _seconds(value: Any, what: str) -> float:
     """A time, in whole ms."""
-    seconds = _number(value, what)
+    seconds = number(what, value)
     if not 0 <= seconds <= SECONDS_MAX:
         raise InvalidInput(f"{what} is {seconds:g} s; 0 to {SECONDS_MAX:g} s is allowed. Repeat a step to wait longer.")
     return round(seconds * 1000) / 1000
-
-
-def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise InvalidInput(f"{what} must be a number; {value!r} is none.")
-    if not math.isfinite(value):
-        raise InvalidInput(f"{what} must be a finite number; {value} is none.")
-    return float(value)
-
-
-def _choice(value: Any, of: tuple[str, ...], what: str) -> str:
-    if value not in of:
-        raise InvalidInput(f"{what} is {value!r}; choose one of {', '.join(of)}.")
-    return str(value)
 
 
 @dataclass(frozen=True)
@@ -67,13 +53,13 @@ class Settled:
     then: str = "go on"
 
     def __post_init__(self) -> None:
-        tolerance = _number(self.tolerance_mm, "The tolerance")
+        tolerance = number("The tolerance", self.tolerance_mm)
         low, high = limits.TOLERANCE_MIN_UM / 1000, limits.TOLERANCE_MAX_UM / 1000
         if not low <= tolerance <= high:
             raise InvalidInput(f"The tolerance is {tolerance:g} mm; {low:g} to {high:g} mm is allowed.")
         object.__setattr__(self, "tolerance_mm", tolerance)
         object.__setattr__(self, "timeout_s", _seconds(self.timeout_s, "The timeout"))
-        _choice(self.then, THEN, "What follows the timeout")
+        one_of("What follows the timeout", self.then, THEN)
 
 
 @dataclass(frozen=True)
@@ -81,7 +67,8 @@ class Step:
     """Ramp to `targets_mm` within `ramp` seconds, then go on `until` says so.
 
     `targets_mm`: one height per bubble, from 0 (no pressure); None leaves that bubble as it is. None alone leaves
-    them all: a step that only waits. `ramp`: 0 is as fast as the valves can. `easing`: one of `EASINGS`.
+    them all: a step that only waits. `ramp`: 0 is as fast as the valves can. `easing`: one of `EASINGS`. Without ramp and
+    `until` it takes a tick: the valves are on their way, and the next step begins.
     """
 
     targets_mm: Items[float | None] | NDArray[np.float64] | None
@@ -94,13 +81,15 @@ class Step:
         if self.targets_mm is not None:
             object.__setattr__(self, "targets_mm", _targets(self.targets_mm))
         object.__setattr__(self, "ramp", _seconds(self.ramp, "The ramp"))
-        _choice(self.easing, EASINGS, "The easing")
+        one_of("The easing", self.easing, EASINGS)
         if not isinstance(self.until, After | Settled):
-            raise InvalidInput(f"A step goes on after some time or when settled; until is {self.until!r}.")
+            raise InvalidInput(f"A step goes on after some time or when settled; until is {shown(self.until)}.")
         if not isinstance(self.name, str):
-            raise InvalidInput(f"A step's name is a text; {self.name!r} is none.")
+            raise InvalidInput(f"A step's name is a text; {shown(self.name)} is none.")
         if not self.longest:
-            raise InvalidInput("A step must take time: give it a ramp, After(seconds) or Settled().")
+            if self.targets_mm is None:
+                raise InvalidInput("A step without targets only waits: give it After(seconds) or Settled().")
+            object.__setattr__(self, "until", After(_TICK))  # each step begins in a tick of its own
 
     @property
     def shortest(self) -> float:
@@ -115,11 +104,11 @@ class Step:
 
 def _targets(values: Any) -> tuple[float | None, ...]:
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
-        raise InvalidInput(f"Targets are a height in mm for each bubble, or None to leave it; {values!r} is not.")
+        raise InvalidInput(f"Targets are a height in mm for each bubble, or None to leave it; {shown(values)} is not.")
     targets: list[float | None] = []
     for bubble, value in enumerate(values):
         if value is not None and not (type(value) is float and 0 <= value <= _TARGET_MAX):
-            value = _number(value, f"The target of bubble {bubble}")
+            value = number(f"The target of bubble {bubble}", value)
             if not 0 <= value <= _TARGET_MAX:
                 raise InvalidInput(
                     f"The target of bubble {bubble} is {value:g} mm; heights are 0 to {_TARGET_MAX:g} mm."
@@ -143,13 +132,13 @@ class Repeat:
 def checked_parts(parts: Any) -> "tuple[Step | Repeat, ...]":
     """Steps and repeats as a tuple; `InvalidInput` for anything else."""
     if isinstance(parts, str | bytes | dict) or not isinstance(parts, Iterable):
-        raise InvalidInput(f"Steps are a list of Step and Repeat; {parts!r} is not.")
+        raise InvalidInput(f"Steps are a list of Step and Repeat; {shown(parts)} is not.")
     if isinstance(parts, Items) and len(parts) > STEPS_MAX:
         raise too_many_steps(len(parts))
     parts = tuple(parts)
     for part in parts:
         if not isinstance(part, Step | Repeat):
-            raise InvalidInput(f"Steps are a list of Step and Repeat; {part!r} is neither.")
+            raise InvalidInput(f"Steps are a list of Step and Repeat; {shown(part)} is neither.")
     return parts
 
 
@@ -161,7 +150,7 @@ def too_many_steps(count: int) -> InvalidInput:
 def check_times(times: Any, what: str) -> None:
     """`InvalidInput` for what is no number of times that `what`, a sequence or a repeat, can be played."""
     if isinstance(times, bool) or not isinstance(times, int) or not 0 <= times <= TIMES_MAX:
-        raise InvalidInput(f"{what} plays {times!r} times; 1 to {TIMES_MAX}, or 0 until it is stopped.")
+        raise InvalidInput(f"{what} plays {shown(times)} times; 1 to {TIMES_MAX}, or 0 until it is stopped.")
 
 
 def each_step(parts: "Items[Step | Repeat]") -> Iterator[Step]:

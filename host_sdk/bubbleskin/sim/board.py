@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubble_firmware.hal.lockstep import LINK_IN
-from bubbleskin import boards
+from bubbleskin import boards, checks
 from bubbleskin.errors import InvalidInput
 from bubbleskin.sim import plant_file
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
@@ -187,7 +187,8 @@ class SimulatedBoard(Simulated):
 
     def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
         """Make bubble `number` fail, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 mends it."""
-        self.plant.inject(fault, number, value)
+        number = checks.whole("The number of the bubble", number, 0, self.data.BUBBLES - 1)
+        self.plant.inject(checks.text("fault", fault), number, checks.number("value", value))
 
     def close(self) -> None:
         """End the firmware."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from bubble_firmware.drivers.flash import PAGE, SECTOR
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import read_bytes, write_bytes
 
 Remains = Callable[[bytes, bytes], bytes]
 """What a cut leaves of one operation, from the bytes before it and those that it would have left."""
@@ -32,7 +33,7 @@ class NorFlash:
         self._cut_at = -1
         self._remains: Remains | None = None
         if path and path.exists():
-            kept = path.read_bytes()
+            kept = read_bytes(path, "the flash", size)
             if len(kept) != size:
                 raise InvalidInput(f"{path} has {len(kept)} bytes, but the simulated flash {size}: name another file.")
             self.image[:] = kept
@@ -66,6 +67,6 @@ class NorFlash:
         self.operations += 1
         self.image[place] = cut(bytes(self.image[place]), after) if cut else after
         if self._path:
-            self._path.write_bytes(self.image)
+            write_bytes(self._path, bytes(self.image), "the flash")
         if cut:
             raise PowerCut

@@ -124,6 +124,10 @@ class LossyTransport(Transport):
         """Let go of the device."""
         self._transport.close()
 
+    def leave_behind(self) -> None:
+        """See `Transport`."""
+        self._transport.leave_behind()
+
     def _damaged(self, data: bytes, outward: bool) -> bytes:
         """Frame by frame."""
         out = []

@@ -59,6 +59,7 @@ class MicroPythonFirmware(Firmware):
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
                 bufsize=0,
+                start_new_session=True,  # a terminal's Ctrl-C is for us, who then end it ourselves
             )
         except OSError as error:
             self._errors.close()

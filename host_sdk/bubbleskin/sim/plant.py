@@ -32,8 +32,11 @@ A bubble that a push flings to another place goes there some ms earlier or later
 elsewhere on the way. Where it could fall to either side, the step may decide, as does all else that is small.
 
 Stable up to twice the settling time of the node: 160 µs against the tube, 100 µs with both valves open,
-25 µs with both open and no restrictors (C = 0.03 dm³/(s·bar)), which needs a shorter step.
+25 µs with both open and no restrictors (C = 0.03 dm³/(s·bar)), which needs a shorter step; real rubber takes that by itself.
 """
+
+SHORTEST = 2e-6
+"""Shortest step, s: 25 times the work."""
 
 REACH = 18e-3
 """Bubbles whose barbs are further apart never meet, m: past a radius of 9 mm they slip off."""
@@ -73,8 +76,13 @@ class Plant:
         n = len(parameters.mu)
         self.parameters = parameters
         self.time = 0.0
-        self._substep = substep
         self._real = parameters.rubber == "real"
+        self._substep = min(substep, real_rest.longest_step(parameters, contact is not None)) if self._real else substep
+        if self._substep < SHORTEST:
+            raise InvalidInput(
+                f"These parameters need steps of {self._substep * 1e6:.2g} µs, which would take forever: "
+                "a node volume, tube resistance or viscosity is far too small."
+            )
         self._atmosphere = parameters.supply.atmosphere
         self._neck = parameters.neck if self._real else np.zeros(n)
         self._constants = np.empty(n, records.CONSTANTS)

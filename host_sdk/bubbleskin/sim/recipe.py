@@ -101,6 +101,9 @@ def make_parameters(n: int, seed: int, spread: float, **options: Unpack[PlantOpt
 
 
 def _check(spread: float, options: PlantOptions) -> None:
+    for name in options:
+        if name not in PlantOptions.__annotations__:
+            raise InvalidInput(f"A plant has no option {name!r}; known are {', '.join(PlantOptions.__annotations__)}.")
     for name, choice in (("rubber", RUBBERS), ("sheet", tuple(SHEETS))):
         if options.get(name, choice[0]) not in choice:
             raise InvalidInput(f"{name} is {options.get(name)!r}; choose one of {', '.join(choice)}.")

@@ -6,6 +6,7 @@ import numpy as np
 
 from bubble_protocol import codec, frame
 from bubble_protocol.schema import telemetry
+from bubbleskin.checks import several, shown
 from bubbleskin.device.faults import board_fault_names, fault_names
 from bubbleskin.device.state import State, mode_name, status_name
 from bubbleskin.errors import InvalidInput
@@ -25,10 +26,10 @@ def most(bubbles: int) -> int:
 
 def mask(fields: Iterable[str], bubbles: int) -> int:
     """The bits of some columns; `InvalidInput` for one that there is not, none, or too many."""
-    chosen = [fields] if isinstance(fields, str) else list(fields)
+    chosen = [fields] if isinstance(fields, str) else several("fields", fields, f"names among {', '.join(NAMES)}")
     for name in chosen:
-        if name not in NAMES:
-            raise InvalidInput(f"Telemetry has no field {name!r}; choose among {', '.join(NAMES)}.")
+        if not isinstance(name, str) or name not in NAMES:
+            raise InvalidInput(f"Telemetry has no field {shown(name)}; choose among {', '.join(NAMES)}.")
     if not 1 <= len(set(chosen)) <= most(bubbles):
         raise InvalidInput(
             f"{len(set(chosen))} fields for {bubbles} bubbles; a message has room for 1 to {most(bubbles)}."

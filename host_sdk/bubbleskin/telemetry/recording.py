@@ -12,6 +12,7 @@ from typing import Any, Self
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput, LinkError
+from bubbleskin.files import guarded, path_of
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import run_sync
 
@@ -30,7 +31,7 @@ class Table:
     """
 
     def __init__(self, path: str | os.PathLike[str], info: Info, layout: Layout, rate_hz: float):
-        self.path = Path(path)
+        self.path = path_of(path, "the recording")
         self.rows = 0
         if self.path.suffix not in SUFFIXES:
             raise InvalidInput(f"{self.path} does not say its kind; end it in {' or '.join(SUFFIXES)}.")
@@ -39,32 +40,47 @@ class Table:
             _pyarrow()
         self._metadata = metadata(info, layout, rate_hz)
         self._csv = self.path.with_suffix(_PARTIAL) if self._parquet else self.path
-        try:
+        with guarded(self._csv, "the recording"):
             self._file = self._csv.open("w", newline="", encoding="utf-8")
-        except OSError as error:
-            raise InvalidInput(f"{self._csv} cannot be written: {error.strerror}.") from None
         for key, value in self._metadata.items():
             self._file.write(f"# {key}: {json.dumps(value)}\n")
         self._writer = csv.writer(self._file, lineterminator="\n")
         self._columns: list[str] | None = None
+        self._whole = 0  # bytes that hold whole rows
 
     def write(self, state: State) -> None:
-        """Add a row."""
+        """Add a row. `InvalidInput` where the disk is full: the rows before it are kept, and the file stays readable."""
         columns = list(_cells(state))
         if self._columns is None:
             self._columns = [name for name, _ in columns]
             self._writer.writerow(self._columns)
-        self._writer.writerow([_text(value) for _, value in columns])
-        self._file.flush()
+        try:
+            self._writer.writerow([_text(value) for _, value in columns])
+            self._file.flush()
+        except OSError as error:
+            self._cut()
+            raise InvalidInput(f"{self.path} ends after {self.rows} rows: {error.strerror}.") from None
         self.rows += 1
+        self._whole = self._file.tell()
+
+    def _cut(self) -> None:
+        """Take half a row away again, and with it what waits in the file's buffer, which closing would try to write."""
+        with contextlib.suppress(OSError):  # a device cannot be cut
+            os.ftruncate(self._file.fileno(), self._whole)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self._file.fileno())
+        os.close(nowhere)
+        self._file.close()
 
     def close(self) -> None:
         """Finish the file."""
         if self._file.closed:
             return
-        self._file.close()
+        with guarded(self._csv, "the recording"):
+            self._file.close()
         if self._parquet:
-            self._to_parquet()
+            with guarded(self.path, f"the recording, whose rows are in {self._csv},"):
+                self._to_parquet()
             self._csv.unlink()
 
     def _to_parquet(self) -> None:
@@ -94,7 +110,7 @@ class Recording:
     def __init__(self, table: Table, end: Callable[[], Coroutine[Any, Any, None]]):
         self._table = table
         self._end: Callable[[], Coroutine[Any, Any, None]] | None = end
-        self._broken: OSError | None = None
+        self._broken: InvalidInput | None = None
         self.lost = 0
 
     def __repr__(self) -> str:
@@ -116,7 +132,7 @@ class Recording:
         if not self._broken:
             try:
                 self._table.write(state)
-            except OSError as error:
+            except InvalidInput as error:
                 self._broken = error
 
     async def aclose(self) -> None:
@@ -129,11 +145,11 @@ class Recording:
         finally:
             try:
                 self._table.close()
-            except OSError as error:
+            except InvalidInput as error:
                 self._broken = self._broken or error
         if self._broken:
             why, self._broken = self._broken, None
-            raise InvalidInput(f"{self.path} ends after {self.rows} rows: {why.strerror}.") from why
+            raise why
 
     def close(self) -> None:
         """Unsubscribe and finish the file; a second time does nothing. `InvalidInput` if not all could be written."""

@@ -6,6 +6,7 @@ import os
 from collections.abc import AsyncGenerator, Iterable
 
 from bubble_protocol.schema import messages
+from bubbleskin import checks
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput, LinkError
@@ -14,6 +15,9 @@ from bubbleskin.link.link import Link
 from bubbleskin.link.message import Message
 from bubbleskin.telemetry.fields import USUAL, mask, most, state
 from bubbleskin.telemetry.recording import Recording, Table
+
+LEAST_HZ = 0.01
+"""Slowest telemetry: every 100 s. Who waits longer takes `state`."""
 
 
 class Telemetry:
@@ -64,8 +68,8 @@ class Telemetry:
     ) -> Recording:
         """See `Skin.record`."""
         request, period = self._subscription(rate_hz, fields)
-        if seconds is not None and not 0 < seconds < float("inf"):
-            raise InvalidInput(f"seconds is {seconds}; give how long to record, or None to go on until it is closed.")
+        if seconds is not None:
+            seconds = checks.above_zero("seconds", seconds, unit="s")
         link = self._link
         recording = Recording(Table(path, self._info, layout, 1 / (period * self._info.tick)), self._unrecord)
         self._iterator += 1  # an iterator that reads telemetry ends
@@ -100,10 +104,7 @@ class Telemetry:
         if self._recording:
             raise InvalidInput(f"{self._recording.path} is being recorded; there is one telemetry at a time.")
         highest = 1 / self._info.tick
-        if not 0 < rate_hz <= highest:
-            raise InvalidInput(
-                f"rate_hz is {rate_hz}; telemetry comes more than 0 and up to {highest:g} times a second."
-            )
+        rate_hz = checks.number("rate_hz", rate_hz, LEAST_HZ, highest, "a second")
         period = max(1, round(highest / rate_hz))
         if fields is None and self._info.tells_sd and most(self._info.bubbles) >= len(USUAL):
             fields = USUAL
