@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """What the membrane says of one bubble whose line is quiet: a correction of its air, as far as that is the better witness.
 
 Air is metered, so its error grows with every dose. The curve's error does not, but it is large: rubber has a memory, sheets
