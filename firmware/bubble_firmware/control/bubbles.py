@@ -7,14 +7,14 @@ The state is one array of integers, laid out in `state_layout`. Three passes ove
 
 from array import array
 
-from bubble_firmware.control import curve, flow, trajectory
+from bubble_firmware.control import curve, flow, reference, trajectory
 from bubble_firmware.control.dose import dose
-from bubble_firmware.control.estimate import estimate
-from bubble_firmware.control.reference import reference
+from bubble_firmware.control.estimate import estimate, restart
 from bubble_firmware.control.table import KNOTS_MAX
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr32, uint
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import ModuleType
     from typing import Any
 
@@ -49,7 +49,7 @@ _AIR_SD = const(49)
 _CURVE_ERROR_SD = const(51)
 _HEIGHT_SD = const(53)
 _DWELL_SLOPE = const(56)
-_ROW_WORDS = const(64)
+_ROW_WORDS = const(69)
 _KNOT_VOLUME = const(1)
 _KNOT_WORDS = const(5)
 _BUBBLE_COUNT = const(0)
@@ -79,6 +79,7 @@ _ROOTS = const(27)
 _ROOT_STEPS = const(64)
 _ROWS = const(157)
 _ATMOSPHERE = const(101325)
+_RESTART = const(256)
 # [end of constants]
 
 _WHOLE_WAY = const(32768)  # in the shares of `advance`
@@ -155,7 +156,7 @@ class Bubbles:
             rows[at + _AIR] = (_ATMOSPHERE >> 4) * self.curves[rows[at + _FIRST_SEGMENT] // 4 + _KNOT_VOLUME] // 4000
 
         # A default is a local: an attribute costs the chip 2.5 µs. More than 11 locals and values, and a call allocates.
-        work = (self.state, estimate, reference, trajectory.move_setpoints, dose, self.pulses)
+        work = (self.state, estimate, trajectory.move_setpoints, dose, self.pulses)
 
         def step(
             counts: "array[int]",
@@ -163,14 +164,26 @@ class Bubbles:
             control_mode: int,
             rows: memoryview = self.rows,
             work: "tuple[Any, ...]" = work,
+            refer: "Callable[[int], None]" = self._refer,
         ) -> None:
-            chosen = work[1](rows, work[0], counts, supply_pa, control_mode)
-            if chosen:
-                work[2](rows, work[0], chosen)
-            work[3](rows, work[0])
-            work[4](rows, work[0], work[5], control_mode)
+            found = work[1](rows, work[0], counts, supply_pa, control_mode)
+            if found:
+                refer(found)
+            work[2](rows, work[0])
+            work[3](rows, work[0], work[4], control_mode)
 
         self.step = step
+
+    def _refer(self, found: int) -> None:
+        """What is seldom to be done between `estimate` and what follows it."""
+        rows = self.rows
+        state = self.state
+        if found >= _RESTART:
+            restart(rows, state)
+            found -= _RESTART
+        if found and reference.compare(rows, state, found):
+            reference.fade(rows, state, found)
+            reference.correct(rows, state, found)
 
     def _take_up_board(self, board: "ModuleType") -> None:
         state = self.state

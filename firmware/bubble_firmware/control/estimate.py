@@ -1,4 +1,4 @@
-# mypy: disable-error-code="valid-type,index,operator,arg-type"
+# mypy: disable-error-code="valid-type,index,operator,arg-type,no-untyped-def"
 """First pass over all bubbles: from sensor counts to pressure, air and height.
 
 Air is metered: what the valves have brought in the period that ended is the time for which they were open times the mean of
@@ -58,7 +58,8 @@ _FAR_TICKS = const(60)
 _LEAKED = const(61)
 _REZERO = const(62)
 _LEAK_TICK = const(63)
-_ROW_WORDS = const(64)
+_FAR = const(64)
+_ROW_WORDS = const(69)
 _KNOT_HEIGHT = const(0)
 _KNOT_VOLUME = const(1)
 _KNOT_PRESSURE = const(2)
@@ -80,6 +81,10 @@ _ROOT_STEPS = const(64)
 _ROWS = const(157)
 _READINGS_MIN = const(2)
 _READINGS_MEAN = const(8)
+_AIR_SD_MAX = const(60000)
+_EMPTY_PA = const(1000)
+_EMPTY_US = const(15000)
+_RESTART = const(256)
 _ROOT_END = const(8191)
 _OVERPRESSURE = const(1)
 _SENSOR_LOST = const(2)
@@ -87,14 +92,12 @@ _ABSENT = const(65535)
 # [end of constants]
 
 _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps every product of control within 32 bits
-_EMPTY_PA = const(1000)  # a line that has no more for a while is empty: the best reference there is
-_EMPTY_US = const(15000)
 _AIR_SD_EMPTY = const(200)  # µJ
-_AIR_SD_MAX = const(60000)
 _FAR_PA = const(10000)
 _FAR_MOVING_PA = const(15000)  # with what tube, rubber and steep curve add while it moves
 _FAR_MAX = const(3)  # ticks
 _AIR_SD_FAR = const(20000)
+_HEIGHT_SD_FAR = const(1000)  # µm
 
 
 @micropython.viper
@@ -102,7 +105,8 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
     """Take up this tick's `counts`: pressures, faults of the sensors, and air and height of every bubble that is due.
 
     `supply` is the reservoir's pressure in Pa. `mode` is what control is to do, see `state_layout`: where it has changed, every
-    bubble is due. Returns the number, from 1, of the bubble whose mean of a quiet line is to be compared with its curve; 0: none.
+    bubble is due. Returns the number, from 1, of the bubble whose mean of a quiet line is to be compared with its curve, 0 for
+    none, plus RESTART where `restart` has something to do.
     """
     n = board[_BUBBLE_COUNT]
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
@@ -114,6 +118,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
     supply_scale = supply + atmosphere >> 3  # 8 Pa
     supply_reciprocal = 0x3FFFFFFF // (supply + atmosphere)
     chosen = 0
+    found = 0
     i = 0
     while i < n:
         count = counts[i]
@@ -208,8 +213,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                         open_us = energised if was_open else energised - trim[_FILL_OPENS_US]
                     if energised < tick and energised | was_open:
                         open_us += trim[_FILL_CLOSES_US]
-                    if open_us < 0:
-                        open_us = 0
+                    open_us &= ~(open_us >> 31)  # not below 0
                     state[_FILL_OPEN_US] = open_us
                     state[_FILL_FULL] = 1 if energised == tick else 0
                     coming = (flow * open_us >> 12) * 16777 >> 16
@@ -250,10 +254,8 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                     row[_CORRELATION] = 0
             else:
                 row[_EMPTY_TICKS] = 0
-            if air < 0:
-                air = 0
-            if air > _AIR_MAX:
-                air = _AIR_MAX
+            if air >> 31 or air > _AIR_MAX:
+                air = 0 if air < 0 else _AIR_MAX
             row[_AIR] = air
             if row[_AIR_SD] > _AIR_SD_MAX:
                 row[_AIR_SD] = _AIR_SD_MAX
@@ -286,8 +288,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 off = volume - knot[_KNOT_VOLUME]
             height = knot[_KNOT_HEIGHT] + (off * knot[_KNOT_RECIPROCAL] >> 16)
 
-            # A pressure that no memory explains: the air is not what was metered. It is what the curve says, there where it
-            # has this pressure next to the height so far, because a bubble stays on the branch where it was.
+            # A pressure that no memory explains: the air is not what was metered.
             far = pressure - knot[_KNOT_PRESSURE] - (knot[_KNOT_PRESSURE] * (row[_CURVE_ERROR] >> 4) >> 12)
             most = _FAR_MOVING_PA if row[_STATUS] & 3 else _FAR_PA
             if (most - far | most + far) >> 31 == 0 or row[_SUSPECT]:
@@ -295,39 +296,9 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             elif row[_STATUS] & 3 and row[_FAR_TICKS] < _FAR_MAX:
                 row[_FAR_TICKS] = row[_FAR_TICKS] + 1
             else:
-                low = segment
-                high = segment
-                upwards = 1
-                while (pressure - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - pressure) >> 31:
-                    if high == row[_LAST_SEGMENT] and low == row[_FIRST_SEGMENT]:
-                        break
-                    if (upwards and high != row[_LAST_SEGMENT]) or low == row[_FIRST_SEGMENT]:
-                        upwards = 0
-                        high += 4 * _KNOT_WORDS
-                        segment = high
-                    else:
-                        upwards = 1
-                        low -= 4 * _KNOT_WORDS
-                        segment = low
-                    knot = ptr32(uint(curves) + segment)
-                off = pressure - knot[_KNOT_PRESSURE]
-                rise = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
-                if rise == 0:
-                    off = 0
-                    rise = 1
-                off = (off << 10) // rise  # share of the segment, *1024
-                if off < 0:
-                    off = 0
-                if off > 1024:
-                    off = 1024
-                height = knot[_KNOT_HEIGHT] + (off * (knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]) >> 10)
-                volume = knot[_KNOT_VOLUME] + (off * (knot[_KNOT_WORDS + _KNOT_VOLUME] - knot[_KNOT_VOLUME]) >> 10)
-                row[_AIR] = (pressure + atmosphere >> 4) * volume // 4000
-                row[_AIR_SD] = _AIR_SD_FAR
-                row[_CORRELATION] = 0
-                row[_CURVE_ERROR] = 0
-                row[_CURVE_ERROR_SD] = row[_CURVE_SD]
                 row[_FAR_TICKS] = 0
+                row[_FAR] = 1
+                found = _RESTART
             row[_HEIGHT] = height
             row[_HEIGHT_SEGMENT] = segment
             if height > row[_PEAK]:
@@ -335,4 +306,56 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             row[_HEIGHT_SD] = (((row[_AIR_SD] << 12) // absolute >> 4) * (knot[_KNOT_RECIPROCAL] >> 8) >> 8) + 15
         i += 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
-    return chosen
+    return chosen | found
+
+
+@micropython.viper
+def restart(row: ptr32, board: ptr32):
+    """Let the curve say the air of every bubble that `estimate` has found to have another pressure than its air can have.
+
+    It is what the curve has there where it has this pressure next to the height so far: a bubble stays on its branch.
+    """
+    n = board[_BUBBLE_COUNT]
+    curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
+    while n > 0:
+        if row[_FAR]:
+            row[_FAR] = 0
+            pressure = row[_PRESSURE]
+            segment = row[_HEIGHT_SEGMENT]
+            knot = ptr32(uint(curves) + segment)
+            low = segment
+            high = segment
+            upwards = 1
+            while (pressure - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - pressure) >> 31:
+                if high == row[_LAST_SEGMENT] and low == row[_FIRST_SEGMENT]:
+                    break
+                if (upwards and high != row[_LAST_SEGMENT]) or low == row[_FIRST_SEGMENT]:
+                    upwards = 0
+                    high += 4 * _KNOT_WORDS
+                    segment = high
+                else:
+                    upwards = 1
+                    low -= 4 * _KNOT_WORDS
+                    segment = low
+                knot = ptr32(uint(curves) + segment)
+            off = pressure - knot[_KNOT_PRESSURE]
+            rise = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
+            if rise == 0:
+                off = 0
+                rise = 1
+            off = (off << 10) // rise  # share of the segment, *1024
+            if off < 0:
+                off = 0
+            if off > 1024:
+                off = 1024
+            row[_HEIGHT] = knot[_KNOT_HEIGHT] + (off * (knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]) >> 10)
+            row[_HEIGHT_SEGMENT] = segment
+            volume = knot[_KNOT_VOLUME] + (off * (knot[_KNOT_WORDS + _KNOT_VOLUME] - knot[_KNOT_VOLUME]) >> 10)
+            row[_AIR] = (pressure + board[_ATMOSPHERE_PA] >> 4) * volume // 4000
+            row[_AIR_SD] = _AIR_SD_FAR
+            row[_HEIGHT_SD] = _HEIGHT_SD_FAR
+            row[_CORRELATION] = 0
+            row[_CURVE_ERROR] = 0
+            row[_CURVE_ERROR_SD] = row[_CURVE_SD]
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)
+        n -= 1

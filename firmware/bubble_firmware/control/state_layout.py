@@ -75,7 +75,12 @@ FAR_TICKS = const(60)  # in a row with a pressure that the metered air cannot ha
 LEAKED = const(61)  # of it not yet taken off
 REZERO = const(62)  # whether it is being emptied before it goes to its target
 LEAK_TICK = const(63)  # when that was reckoned
-ROW_WORDS = const(64)
+FAR = const(64)  # whether they have become too many
+AIR_SLOPE = const(65)  # air per height at this pressure, µJ/µm, *64
+CURVE_PRESSURE = const(66)  # of the curve at this height, Pa
+CURVE_BEND = const(67)  # how much less it is than on the secant, Pa
+CURVE_SLOPE = const(68)  # of the secant, Pa/µm, *1024
+ROW_WORDS = const(69)
 
 # A knot of a curve, see `curve`.
 KNOT_HEIGHT = const(0)  # 1/16 µm
@@ -125,6 +130,10 @@ READINGS_MIN = const(2)  # in a row that make a fault: one alone is noise
 
 # The law's own numbers, the same for all boards.
 READINGS_MEAN = const(8)  # of a quiet line, which make a mean
+AIR_SD_MAX = const(60000)  # µJ
+EMPTY_PA = const(1000)  # a line that has no more for a while is empty: the best reference there is
+EMPTY_US = const(15000)
+RESTART = const(256)  # of what `estimate` returns
 DOSE_MAX = const(50000)  # µJ, more than any period brings
 ROOT_END = const(8191)  # the last place in a table of roots, *128
 

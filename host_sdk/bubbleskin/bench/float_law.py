@@ -7,10 +7,15 @@ comparisons of each reading, no faults, no STOP, no leak, no re-zeroing. Units a
 Pa, µJ, µs, µJ/ms, mm³, shares.
 """
 
-from bubble_firmware.control.state_layout import ATMOSPHERE, DOSE_MAX, FOLLOW, KEEP_CLOSED, READINGS_MEAN
-
-EMPTY_PA = 1000
-EMPTY_US = 15000
+from bubble_firmware.control.state_layout import (
+    ATMOSPHERE,
+    DOSE_MAX,
+    EMPTY_PA,
+    EMPTY_US,
+    FOLLOW,
+    KEEP_CLOSED,
+    READINGS_MEAN,
+)
 
 
 class Curve:
