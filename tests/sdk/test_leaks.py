@@ -1,15 +1,13 @@
 """Connecting and closing, over and over, and many states: no descriptor, thread, process or file is left, and no memory."""
 
 import gc
-import resource
 import threading
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
 import bubbleskin as bs
-
-PAGE = resource.getpagesize()
 
 
 def held():
@@ -20,15 +18,23 @@ def held():
 
 
 def memory():
-    """Bytes that this process occupies."""
+    """Bytes of all objects. What the process occupies rises and falls by megabytes with when the collector runs."""
     gc.collect()
-    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
+    return tracemalloc.get_traced_memory()[0]
+
+
+@pytest.fixture(autouse=True)
+def _traced():
+    tracemalloc.start()
+    yield
+    tracemalloc.stop()
 
 
 def cycles(url, count):
     for _ in range(count):
         with bs.connect(url) as skin:
             skin.show([8.0] * 7, wait=False)
+            skin.vent()  # nothing for the next one to be told of: pytest keeps what is logged
 
 
 TARGETS = {
@@ -46,21 +52,21 @@ def test_connecting_and_closing_leaves_nothing(request, target):
     if target == "port":
         request.getfixturevalue("served_port")
         url = request.getfixturevalue("port").name
-    cycles(url, count // 2)  # until the heap is as large as it becomes between two collections
+    cycles(url, 20)
     before, occupied = held(), memory()
     cycles(url, count)
     assert held() == before
-    assert memory() - occupied < 2e6
+    assert memory() - occupied < 100e3
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_a_hundred_thousand_states_leave_nothing():
+def test_many_states_leave_nothing():
     with bs.connect("sim://wristband7?contact=0") as skin:
-        for _ in range(2_000):
+        for _ in range(500):
             skin.state()
         before, occupied = held(), memory()
-        for _ in range(100_000):
+        for _ in range(20_000):
             skin.state()
         assert held() == before
-        assert memory() - occupied < 2e6
+        assert memory() - occupied < 100e3
