@@ -1,4 +1,4 @@
-# make demo: see it. make test: every check that needs no hardware, 16 minutes on two cores. make check: the everyday ones, four.
+# make demo: see it. make test: every check that needs no hardware, most of half an hour on two cores. make check: the everyday ones.
 
 PYTHON ?= python3
 VENV := .venv
@@ -29,13 +29,13 @@ demo: setup ## a simulated wristband takes two shapes; ends with a picture
 	$(BIN)/bubbleskin demo
 
 test: setup lint generated micropython ## every check that needs no hardware, 16 minutes
-	@echo "the everyday tests; coverage is recorded in these, because it makes them half as slow again"
+	@echo "the everyday tests, 100 examples of each property; coverage is of these, because it makes them half as slow again"
 	$(BIN)/python -m pytest $(EVERYDAY) --cov --cov-report=term
 	@echo "the firmware's arithmetic as Python that raises where a result leaves 32 bits"
 	BUBBLESKIN_JIT=check $(BIN)/python -m pytest -q -n 2 tests/firmware/test_golden_traces.py tests/firmware/test_arithmetic.py
 	@echo "hil_tests where bubbles touch"
 	$(BIN)/python -m pytest -q -n 2 hil_tests --target "sim://wristband7"
-	@echo "the slow tests"
+	@echo "the slow tests: all others that need no hardware and no emulated chip, 2,000 scenarios of the promises among them"
 	$(BIN)/python -m pytest -n 2 -m "slow and not chip"
 
 chip: setup micropython ## build the RP2040's firmware, run its tests and hil_tests on an emulated chip, 20 minutes
@@ -47,8 +47,9 @@ chip-long: setup micropython ## what takes longer on an emulated chip
 	$(BIN)/bubbleskin firmware build
 	$(BIN)/python -m pytest -n 2 -m "chip and long"
 
-check: setup lint ## the everyday checks: lint, types, imports, rules, tests of a few seconds; four minutes
-	$(BIN)/python -m pytest $(EVERYDAY)
+check: setup lint ## the everyday checks: lint, types, imports, rules, tests of about a second and less
+	@echo "the everyday tests: about a second each and less, 20 examples of each property; those that take longest are named"
+	BUBBLESKIN_EXAMPLES=20 $(BIN)/python -m pytest -q $(EVERYDAY) --durations=5 --durations-min=2
 
 lint: setup ## style, types, import contracts, the rules of tests/house
 	$(BIN)/ruff check
