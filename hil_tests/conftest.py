@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import bubbleskin as bs
 
 TARGETS = ("sim://wristband7?contact=0", "micropython://wristband7?contact=0")
-"""Bubbles that stand alone. Where they touch, heights are those of each by itself: the firmware cannot see that a neighbour
-lifts a bubble."""
+"""Taken where no target is named, the second one as slow. Bubbles stand alone: where they touch, heights are those of each by
+itself, because the firmware cannot see that a neighbour lifts a bubble."""
 EMULATED_SLOWNESS = 10
 """Times as long as on a real board, at most: guards against hangs are longer by this on an emulated chip."""
 FLAT_KPA = 0.4  # sensor noise is 50 Pa
@@ -30,7 +30,9 @@ def pytest_addoption(parser):
 
 def pytest_generate_tests(metafunc):
     if "target" in metafunc.fixturenames:
-        metafunc.parametrize("target", metafunc.config.getoption("--target") or TARGETS, scope="session")
+        everyday, *others = TARGETS
+        usual = [everyday, *[pytest.param(url, marks=pytest.mark.slow) for url in others]]
+        metafunc.parametrize("target", metafunc.config.getoption("--target") or usual, scope="session")
 
 
 def pytest_collection_modifyitems(config, items):

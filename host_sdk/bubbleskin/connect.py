@@ -1,12 +1,13 @@
 """From a URL to a wristband: serial ports, sockets, and simulated boards."""
 
+import logging
 import os
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from bubbleskin import boards, checks
 from bubbleskin.async_skin import AsyncSkin
-from bubbleskin.errors import InvalidInput
+from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import run_sync
 from bubbleskin.link.serial import SerialTransport, only_attached
@@ -15,6 +16,8 @@ from bubbleskin.skin import Skin
 
 if TYPE_CHECKING:
     from bubbleskin.sim.board import Simulated
+
+_log = logging.getLogger(__name__)
 
 SIMULATED = ("sim", "micropython", "rp2040")
 TIMEOUT_MAX = 3600.0
@@ -36,9 +39,9 @@ def connect(url: str | os.PathLike[str] | None = None, *, timeout: float = 2.0, 
     """
     patience = _checked(timeout, layout)
     transport, board = open_transport(url)
-    skin = Skin(run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout)))
-    skin.link.warns = transport.blocks  # a simulated board holds nothing that anybody else could want
-    return skin
+    opened = run_sync(AsyncSkin.open(transport, patience, simulated=board, layout=layout))
+    run_sync(_opened(opened, board is not None))
+    return Skin(opened)
 
 
 async def aconnect(
@@ -48,8 +51,25 @@ async def aconnect(
     patience = _checked(timeout, layout)
     transport, board = open_transport(url)
     skin = await AsyncSkin.open(transport, patience, event_loop=True, simulated=board, layout=layout)
-    skin.link.warns = transport.blocks  # a simulated board holds nothing that anybody else could want
+    await _opened(skin, board is not None)
     return skin
+
+
+async def _opened(skin: AsyncSkin, simulated: bool) -> None:
+    """Tell what a program before this one has left behind. A board simulated in here has had none, and holds nothing."""
+    skin.link.warns = skin.link.transport.blocks
+    if simulated:
+        return
+    try:
+        mode = (await skin.state()).mode
+    except LinkError:  # whoever asks for something will be told
+        return
+    if mode in ("active", "holding"):
+        _log.warning(
+            "A shape stands on %s, of a program that has ended less than a second ago or was killed. It stays while this one "
+            "is connected, until show() or vent().",
+            skin.link.transport.name,
+        )
 
 
 def open_transport(url: str | os.PathLike[str] | None) -> "tuple[Transport, Simulated | None]":

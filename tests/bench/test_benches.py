@@ -11,6 +11,8 @@ import bubbleskin.bench
 from bubbleskin.bench import BENCHES, measure
 from bubbleskin.cli.bench import bench
 
+pytestmark = pytest.mark.slow
+
 SMALL = 0.005
 ON_THE_CHIP = {"rp2040", "trace", "float_law"}
 

@@ -95,6 +95,7 @@ def test_it_is_frozen_as_its_board(pad8):
     assert frozen.key("12", files) != frozen.key("12", ours)
 
 
+@pytest.mark.slow
 def test_it_goes_onto_a_stock_micropython(pad8):
     files = mpy.files(str(pad8))
     assert "bubble_firmware/boards/pad8.mpy" in files

@@ -129,6 +129,7 @@ def test_monitor_prints_a_line_for_each_state(run):
     assert states[-1]["time"] - states[0]["time"] == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_demo_prints_heights_and_draws(run, tmp_path):
     picture = tmp_path / "demo.png"
     status, out, _ = run("demo", "--output", str(picture))

@@ -51,6 +51,7 @@ def test_gradient_is_that_of_the_energy(model):
         assert np.abs(g - numeric).max() < 1e-6 * np.abs(g).max()
 
 
+@pytest.mark.slow
 def test_curvature_is_that_of_the_gradient(model):
     rng = np.random.default_rng(2)
     state, pressure = crowded(model, rng)

@@ -33,6 +33,7 @@ def test_no_input_of_the_corpus_does_harm(target):
         target.one_input(bytes.fromhex(line))
 
 
+@pytest.mark.slow
 def test_the_fuzz_sees_what_it_watches():
     pytest.importorskip("atheris")
     command = [sys.executable, TOOLS / "fuzz.py", "--worker", "-runs=3", "-seed=1"]

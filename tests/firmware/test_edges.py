@@ -137,7 +137,7 @@ def frames(board, every):
 @pytest.mark.parametrize(
     ("name", "every"),
     [
-        pytest.param("wristband7", 10, id="quick"),
+        pytest.param("wristband7", 10, id="quick", marks=pytest.mark.slow),
         pytest.param("wristband7", 1, id="all", marks=pytest.mark.slow),
         pytest.param("wristband19", 1, id="all of 19", marks=pytest.mark.slow),
     ],

@@ -281,7 +281,7 @@ def valid_frames():
 @pytest.mark.parametrize(
     ("bytes_", "mutations", "requests"),
     [
-        pytest.param(60_000, 6_000, 2_000, id="quick"),
+        pytest.param(60_000, 6_000, 2_000, id="quick", marks=pytest.mark.slow),
         pytest.param(1_000_000, 100_000, 30_000, id="full", marks=pytest.mark.slow),
     ],
 )

@@ -195,6 +195,7 @@ def hostile(seed, board, ticks):
         yield array("H", counts), link
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("micropython")
 @pytest.mark.parametrize("seed", range(2))
 def test_what_no_plant_would_do_is_computed_the_same(seed):

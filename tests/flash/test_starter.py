@@ -87,6 +87,7 @@ def test_in_every_state_of_the_board_the_right_slot_starts(micropython, tmp_path
         )
 
 
+@pytest.mark.slow
 def test_the_files_are_all_of_the_firmware_and_its_start_comes_last():
     files = mpy.files("wristband19")
     assert list(files)[-1] == mpy.LAST

@@ -82,6 +82,7 @@ def run(cache, code: str = ADDED) -> tuple[list[str], str]:
     return done.stdout.split(), done.stderr
 
 
+@pytest.mark.slow
 def test_two_processes_may_compile_at_once_and_say_so_and_a_third_does_not_import_numba(tmp_path):
     with ThreadPoolExecutor() as pool:
         both = list(pool.map(run, [tmp_path] * 2))
@@ -158,6 +159,7 @@ print(before, "numba" in sys.modules, out[0] > 1e4)
 """
 
 
+@pytest.mark.slow
 def test_numba_comes_when_something_is_called(tmp_path):
     assert run(tmp_path, LATER)[0] == ["False", "True", "True"]
 
@@ -172,6 +174,7 @@ print(*[name for name in ("numba", "scipy", "matplotlib") if name in sys.modules
 """
 
 
+@pytest.mark.slow
 def test_a_board_is_opened_without_numba_and_scipy():
     done = subprocess.run([sys.executable, "-c", OPENED], capture_output=True, text=True, check=True)
     if done.stderr:  # it has compiled, because no test before has

@@ -15,7 +15,7 @@ SCENARIOS = int(os.environ.get("BUBBLESKIN_SCENARIOS", "2000"))
 """Of the slow test: `BUBBLESKIN_SCENARIOS=20000 pytest -n 2 tests/promises -m slow` for a longer look."""
 SHARES = 8
 """Tests that the scenarios are shared out to, each with other ones, so that they can run beside each other."""
-FEW = 25
+FEW = 5
 STEPS = 14
 
 FAILURES = (

@@ -52,7 +52,7 @@ def word(value):
 
 
 @every_message
-@settings(max_examples=20)
+@settings(max_examples=settings.default.max_examples // 5)  # of every message
 @given(data=st.data())
 def test_pack_and_unpack_are_structs(message, data):
     count = data.draw(st.integers(0, room(message)))

@@ -87,3 +87,13 @@ def test_a_killed_process_is_noticed():
     heard = max(tick - silent for tick, silent, _ in seen if silent <= 1 and tick < held.time / 0.005)
     assert held.time == pytest.approx((heard + 49) * 0.005, abs=0.006), "50 ticks after the last that heard of it"
     assert vented.time - held.time == pytest.approx(0.75)
+
+
+def test_who_connects_while_a_shape_stands_is_told(served_port, port, caplog):
+    with bs.connect(port.name) as skin:
+        skin.show([9.0] * 7, wait=False)
+        assert not caplog.records, "nothing stood before"
+    with bs.connect(port.name) as skin:
+        (told,) = caplog.records
+        assert "A shape stands on" in told.getMessage()
+        skin.vent()

@@ -1,6 +1,7 @@
 """Playing a sequence over links that lose things, as a stream, from files, and beside other tasks."""
 
 import asyncio
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -212,3 +213,23 @@ def test_pause_and_stop_from_another_task():
                 await playing
 
     asyncio.run(run())
+
+
+def test_a_name_of_the_library_is_played():
+    with bs.connect("sim://wristband7?contact=0") as skin:
+        assert len(skin.play("breathing").steps) == 6
+        assert skin.play(bs.Sequence([bs.Step([7] * 7)])).steps == (0,), "a step needs no more than targets"
+
+
+def test_a_play_that_is_cancelled_in_asyncio_stops_the_wristband():
+    async def main():
+        async with await bs.aconnect("sim://wristband7?contact=0") as skin:
+            playing = asyncio.create_task(skin.play(bs.sequences.pulse(skin.layout, loops=0)))
+            while (await skin.playing()).state != "playing":
+                await skin.sleep(0.05)
+            playing.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await playing
+            return (await skin.state()).mode, (await skin.playing()).state
+
+    assert asyncio.run(main()) == ("holding", "ended"), "what STOP makes of it"

@@ -122,10 +122,13 @@ import os, sys, time, warnings
 warnings.simplefilter("ignore")
 import bubbleskin as bs
 skin = bs.connect(sys.argv[1])
+there, here = os.pipe()
 child = os.fork()
 if not child:
+    os.write(here, b"!")  # it has let go of its copy: a fork does so before anything else
     time.sleep(5)
     os._exit(0)
+os.read(there, 1)
 skin.close()
 with bs.connect(sys.argv[1]) as again:
     print(again.state().mode)

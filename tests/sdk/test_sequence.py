@@ -51,6 +51,7 @@ def sequences(draw):
         return bs.Sequence(steps[:1])
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(sequences())
 def test_json_comes_back_as_it_was_and_is_by_the_schema(sequence):

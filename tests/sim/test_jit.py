@@ -173,6 +173,7 @@ def run(**environment):
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.slow
 def test_compiled_plain_and_checked_are_the_same(tmp_path):
     """And where nothing can be kept it is plain, and says so once."""
     nowhere = tmp_path / "file"

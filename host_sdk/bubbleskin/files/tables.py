@@ -60,7 +60,7 @@ class Grid:
         if len(self._decimal) == 2:
             comma, point = self._decimal[","], self._decimal["."]
             raise CellError(
-                f"is {shown(cell.text)}: {comma.text} in line {comma.line} has a decimal comma and {point.text} in line "
+                f"is {shown(cell.text)}: {comma.text[:60]} in line {comma.line} has a decimal comma and {point.text[:60]} in line "
                 f"{point.line} a point. Write all with points"
             )
         value = float(text.replace(",", "."))
@@ -70,7 +70,7 @@ class Grid:
 
     def place(self, cell: Cell, heading: str = "") -> str:
         """Where a cell stands, for a sentence."""
-        return f"{self.name}, line {cell.line}, column {heading or cell.column}"
+        return f"{self.name}, line {cell.line}, column {heading[:60] or cell.column}"
 
 
 def read_table(path: Any, what: str) -> Grid:

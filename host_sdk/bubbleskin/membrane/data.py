@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bubbleskin.checks import flag, whole
+from bubbleskin.checks import flag, shown, whole
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import Cell, CellError, Grid, read_table, width, write_text
 
@@ -145,7 +145,7 @@ def _columns(table: Grid) -> tuple[list[tuple[str, float] | None], list[list[Cel
             name, unit = names[k]
             if unit and cell.text and _factor(name, unit) != _factor(name, cell.text):
                 raise InvalidInput(
-                    f"{table.place(cell, header[k].text)}: the unit is {unit!r} in the header and {cell.text!r} here; keep one."
+                    f"{table.place(cell, header[k].text[:60])}: the unit is {shown(unit)} in the header and {shown(cell.text)} here; keep one."
                 )
             names[k] = name, unit or cell.text or None
     columns = [_column(table, cell.text, *named) for cell, named in zip(header, names, strict=True)]
@@ -189,13 +189,13 @@ def _column(table: Grid, text: str, name: str, unit: str | None) -> tuple[str, f
         return None
     if unit is None:
         raise InvalidInput(
-            f"{table.name}: the column {text!r} has no unit; write it in the header, as {_example(name)}."
+            f"{table.name}: the column {shown(text)} has no unit; write it in the header, as {_example(name)}."
         )
     factor = _factor(name, unit)
     if factor is None:
         quantity = name.removesuffix("_sd")
         raise InvalidInput(
-            f"{table.name}: {unit!r} in the column {text!r} is no unit of {quantity} known here; "
+            f"{table.name}: {shown(unit)} in the column {shown(text)} is no unit of {quantity} known here; "
             f"there are {', '.join(UNITS[quantity])}."
         )
     return name, factor
@@ -217,12 +217,12 @@ def _row(table: Grid, columns: list[tuple[str, float] | None], cells: list[Cell]
         except CellError as error:
             raise CellError(f"{name} {error}") from None
         if name in NUMBERED and not (0 <= value <= _NUMBER_MAX and value == int(value)):
-            raise CellError(f"{name} is {cell.text}, not a whole number")
+            raise CellError(f"{name} is {cell.text[:60]}, not a whole number")
         if name in ("height", "height_sd", "pressure_sd") and value <= 0:
-            raise CellError(f"{name} is {cell.text}, but must be above zero")
+            raise CellError(f"{name} is {cell.text[:60]}, but must be above zero")
         if name == "bubble":
             value -= first
             if value < 0:
-                raise CellError(f"bubble is {cell.text}, and bubbles are said to count from {first}")
+                raise CellError(f"bubble is {cell.text[:60]}, and bubbles are said to count from {first}")
         row[name] = value * factor
     return row

@@ -19,9 +19,20 @@ FAILURES = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sens
 SUPPLY_FAILURES = ("supply_stuck", "supply_flat", "supply_bias", "supply_absent", "relief_stuck")
 """The same of the reservoir."""
 
-REAL = ("node_air", "line_air", "stress", "quick", "slow", "largest")
+REAL = (
+    "node_air",
+    "line_air",
+    "stress",
+    "quick",
+    "slow",
+    "largest",
+    "quick_left",
+    "quick_new",
+    "slow_left",
+    "slow_new",
+)
 """What only `rubber="real"` moves: air of node and of line and sphere (pV at the reference temperature, J), elastic stress
-and the overstress of both branches (Pa), and the largest stretch so far."""
+and the overstress of both branches (Pa), the largest stretch so far, and what a step does to both branches."""
 
 STATE = np.dtype(
     [(name, "f8") for name in ("stretch", "pressure", "node", "membrane")]

@@ -28,7 +28,7 @@ _open_fraction = njit(pneumatics.open_fraction)
 _energy_density = njit(rubber.energy_density)
 _elastic_stress = njit(rubber.elastic_stress)
 _softening = njit(rubber.softening)
-_overstress = njit(rubber.overstress)
+_branch = njit(rubber.branch)
 _wall_pressure = njit(rubber.wall_pressure)
 _expanded = njit(gas.expanded)
 _cooled = njit(gas.cooled)
@@ -44,8 +44,8 @@ def _orifice(p1, p2, warm1, warm2, conductance, b):  # type: ignore[no-untyped-d
 
 
 @njit(inline="always")
-def _wall(s, p, h):  # type: ignore[no-untyped-def]
-    """Stresses of the wall at its new stretch, `h` s after the last ones, and the pressure that it holds."""
+def _wall(s, p):  # type: ignore[no-untyped-def]
+    """Stresses of the wall at its new stretch, a step after the last ones, and the pressure that it holds."""
     stress = _elastic_stress(s.stretch, p.mu, p.c2, p.c3)
     if s.stretch >= s.largest:
         s.largest = s.stretch
@@ -53,8 +53,8 @@ def _wall(s, p, h):  # type: ignore[no-untyped-def]
         worst = _energy_density(s.largest, p.mu, p.c2, p.c3)
         stress *= _softening(_energy_density(s.stretch, p.mu, p.c2, p.c3), worst, p.mullins, p.mullins_width)
     change = stress - s.stress
-    s.quick = _overstress(s.quick, change, p.quick_strength, p.quick_time, h)
-    s.slow = _overstress(s.slow, change, p.slow_strength, p.slow_time, h)
+    s.quick = s.quick_left * s.quick + s.quick_new * change
+    s.slow = s.slow_left * s.slow + s.slow_new * change
     s.stress = stress
     s.membrane = _wall_pressure(s.stretch, stress + s.quick + s.slow, p.thickness, p.radius)
 
@@ -74,7 +74,7 @@ def _step_bubble(s, p, source, outside, load, t, h):  # type: ignore[no-untyped-
     """
     wall = outside[1]
     volume = _volume(s, p)
-    warm_node, warm = s.node * p.node_volume / s.node_air, s.pressure * volume / s.line_air
+    warm_node = s.node * p.node_volume / s.node_air
     fill = fill_heat = vent = vent_heat = lost = lost_heat = 0.0
     fraction = _open_fraction(s.fill_start, s.fill_stop, t, h)
     if fraction > 0.0:
@@ -85,8 +85,11 @@ def _step_bubble(s, p, source, outside, load, t, h):  # type: ignore[no-untyped-
     if fraction > 0.0:
         vent, vent_heat = _orifice(s.node, outside[0], warm_node, wall, fraction * p.vent_conductance, p.critical_ratio)
     tube_heat = _tube_flow(s.node, s.pressure, p.tube_resistance * outside[2])
-    tube = tube_heat / (warm_node if tube_heat >= 0.0 else warm)
     leak = p.leak + s.leak
+    warm = warm_node
+    if tube_heat < 0.0 or leak > 0.0 or s.pop_off > 0.0:
+        warm = s.pressure * volume / s.line_air
+    tube = tube_heat / (warm_node if tube_heat >= 0.0 else warm)
     if leak > 0.0:
         lost_heat = leak * (s.pressure - outside[0])
         lost = lost_heat / warm
@@ -97,7 +100,7 @@ def _step_bubble(s, p, source, outside, load, t, h):  # type: ignore[no-untyped-
 
     stretch = s.stretch + h * (s.pressure - outside[0] - s.membrane - load) / p.viscosity
     s.stretch = min(max(stretch, STRETCH_MIN), STRETCH_MAX)
-    _wall(s, p, h)
+    _wall(s, p)
     after = _volume(s, p)
 
     s.node_air += h * (fill - vent - tube)
@@ -118,6 +121,10 @@ def _advance(bubbles, reservoir, touch, coils, dt, substeps, pump, dump):  # typ
     wall = supply.temperature / REFERENCE_TEMPERATURE
     outside = (supply.atmosphere, wall, wall**VISCOSITY_EXPONENT)
     _set_windows(bubbles, coils, dt)
+    for i in range(len(state)):
+        s, p = state[i], constants[i]
+        s.quick_left, s.quick_new = _branch(p.quick_strength, p.quick_time, h)
+        s.slow_left, s.slow_new = _branch(p.slow_strength, p.slow_time, h)
     for k in range(substeps):
         warm = air.pressure * supply.volume / air.air
         gauge = air.pressure - supply.atmosphere

@@ -36,13 +36,14 @@ def softening(energy: float, worst: float, strength: float, width: float) -> flo
     return 1.0 - strength * math.tanh((worst - energy) / (width * worst))
 
 
-def overstress(before: float, change: float, strength: float, time: float, h: float) -> float:
-    """Stress of a Prony branch after `h` s in which the elastic stress changes by `change`: dQ/dt = g dS/dt − Q/τ.
+def branch(strength: float, time: float, h: float) -> tuple[float, float]:
+    """A Prony branch over `h` s: what is left of its stress, and what of a change of the elastic one comes to it.
 
-    The trapezium, right to second order and stable: Simo's finite viscoelasticity in the undeformed rubber's stress.
+    dQ/dt = g dS/dt − Q/τ by the trapezium, right to second order and stable: Simo's finite viscoelasticity in the stress of the
+    undeformed rubber.
     """
     half = 0.5 * h / time
-    return (before * (1.0 - half) + strength * change) / (1.0 + half)
+    return (1.0 - half) / (1.0 + half), strength / (1.0 + half)
 
 
 def wall_pressure(stretch: float, stress: float, thickness: float, radius: float) -> float:
