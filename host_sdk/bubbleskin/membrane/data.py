@@ -145,7 +145,8 @@ def _columns(table: Grid) -> tuple[list[tuple[str, float] | None], list[list[Cel
             name, unit = names[k]
             if unit and cell.text and _factor(name, unit) != _factor(name, cell.text):
                 raise InvalidInput(
-                    f"{table.place(cell, header[k].text[:60])}: the unit is {shown(unit)} in the header and {shown(cell.text)} here; keep one."
+                    f"{table.place(cell, header[k].text[:60])}: the unit is {shown(unit)} in the header "
+                    f"and {shown(cell.text)} here; keep one."
                 )
             names[k] = name, unit or cell.text or None
     columns = [_column(table, cell.text, *named) for cell, named in zip(header, names, strict=True)]
