@@ -23,15 +23,15 @@ WRONG_HEIGHTS = {
     "one too few": (lambda info: np.full(info.bubbles - 1, 6.0), "heights for .* bubbles"),
     "one too many": (lambda info: np.full(info.bubbles + 1, 6.0), "heights for .* bubbles"),
     "none": (lambda info: [], "0 heights for"),
-    "a single number": (lambda info: 6.0, "one height in mm per bubble"),
+    "a single number": (lambda info: 6.0, "One height for .* bubbles: for the same everywhere"),
     "three dimensions": (lambda info: np.zeros((2, 2, 2)), "shape"),
-    "words": (lambda info: ["high"] * info.bubbles, "must be numbers"),
+    "words": (lambda info: ["high"] * info.bubbles, "must be .* numbers, not texts"),
     "NaN": (with_entry(math.nan), "bubble 2, nan mm, is not a number"),
     "infinity": (with_entry(math.inf), "bubble 2, inf mm, is not a number"),
     "negative": (with_entry(-0.5), "bubble 2, -0.5 mm, is negative"),
     "above the limit": (lambda info: with_entry(info.height_max_mm + 0.01)(info), "bubble 2, .* is above the limit"),
     "a callable above the limit": (lambda info: lambda x, y: info.height_max_mm + x * x, "is above the limit"),
-    "a field with NaN": (lambda info: np.full((3, 3), math.nan), "is not a number"),
+    "a field with NaN": (lambda info: np.full((3, 3), math.nan), "nan at .*: nothing is known there"),
 }
 
 

@@ -55,7 +55,7 @@ def test_a_start_at_a_device_time(skin):
     assert playing.begun == pytest.approx(at, abs=skin.info.tick)
     with pytest.raises(bs.DeviceRefused, match="has passed"):
         skin.play(sequence, at=at)
-    with pytest.raises(bs.InvalidInput, match="cannot start at nan"):
+    with pytest.raises(bs.InvalidInput, match="at is nan"):
         skin.play(sequence, at=math.nan)
 
 

@@ -115,11 +115,13 @@ def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf
     """``value`` as one finite number from ``low`` to ``high``."""
     if type(value) is float and low <= value <= high and math.isfinite(value):
         return value
-    values = finite(name, value)
+    values = array(name, value)
     if values.size != 1:
         raise InvalidInput(f"{name} must be one number, not {values.size} of them.")
     one = float(values.item())
-    if not low <= one <= high:
+    if not math.isfinite(one) and (low, high) == (-math.inf, math.inf):
+        finite(name, value)
+    if not (math.isfinite(one) and low <= one <= high):
         raise InvalidInput(f"{name} is {with_unit(one, unit)}; {_range(low, high, unit)} is allowed.")
     return one
 

@@ -182,7 +182,7 @@ def test_progress_is_told(model, up):
         ([np.nan] * 7, "not a number"),
         ([-1] + [8] * 6, "negative"),
         ([30] + [8] * 6, "above the limit"),
-        (["high"] * 7, "numbers of mm"),
+        (["high"] * 7, "numbers, not texts"),
     ],
 )
 def test_heights_that_mean_nothing_are_refused(model, heights, words):
