@@ -86,7 +86,7 @@ def test_nothing_gets_through_and_the_call_ends_in_time(tapped):
     on.append(True)
     before = len(tap.sent)
     begin = tap.now()
-    with pytest.raises(bs.DeviceSilent, match="has not answered STATE within 1 s"):
+    with pytest.raises(bs.DeviceSilent, match="has not answered ESTIMATE within 1 s"):
         skin.state()
     assert tap.now() - begin == pytest.approx(1.0, abs=0.02)
     sent = tap.understood(tap.sent[before:])

@@ -52,7 +52,7 @@ def test_what_is_sent_again_is_told(tapped, caplog):
     with caplog.at_level(logging.INFO, "bubbleskin.link"):
         lost.append(True)
         skin.state()
-    assert told(caplog, logging.INFO, "STATE 2 is sent again")
+    assert told(caplog, logging.INFO, "ESTIMATE 2 is sent again")
     assert not told(caplog, logging.DEBUG), "no frames"
 
 

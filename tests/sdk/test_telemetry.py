@@ -65,7 +65,7 @@ def test_fields_that_there_are_not_are_refused(skin, fields):
 
 
 def test_no_more_fields_than_a_message_has_room_for():
-    assert mask(NAMES, 7) == 255
+    assert mask(NAMES, 7) == 511
     with pytest.raises(InvalidInput, match="1 to 6"):
         mask(NAMES, 19)
 
@@ -122,7 +122,7 @@ def test_a_recording_is_read_by_pandas_in_one_line(skin, tmp_path, suffix):
     np.testing.assert_allclose(np.diff(frame.time_s), 0.02, atol=1e-9)
     np.testing.assert_allclose(frame[[f"height_mm_{b}" for b in range(7)]].iloc[-1], skin.simulated.height_mm, atol=0.3)
     np.testing.assert_allclose(frame[[f"target_mm_{b}" for b in range(7)]].iloc[-1], np.linspace(6, 12, 7))
-    assert set(frame.status_2) <= {"moving", "settled", "resting"}
+    assert set(frame.status_2) <= {"moving", "settled", "unsure", "resting"}
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -71,7 +71,7 @@ def test_a_trim_that_contradicts_itself_is_refused(skin):
 
 def test_a_flow_that_no_restrictor_has_is_refused_by_the_device(skin):
     trim = skin.trim()
-    with pytest.raises(bs.DeviceRefused, match=r"flow_gain .* is allowed"):
+    with pytest.raises(bs.DeviceRefused, match=r"fill_gain .* is allowed"):
         skin.upload_trim(dataclasses.replace(trim, flow_gain=trim.flow_gain // 4))
     flow = trim.flow_gain.copy()
     flow[3] = flow[3] * 4 // 5

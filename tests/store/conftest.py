@@ -71,7 +71,9 @@ class Device:
                 height = 4000 + 10000 * knot // (size - 1)
                 self.tables.write_knot(bubble, knot, height, (number * 7 + bubble + knot) % 40000)
         self.tables.swap()
-        self.trim.use(array("i", [160 + number % 80, *(1000 + number % 999, 999, 4000) * 2, 100, number, 16] * n))
+        one = array("i", [160 + number % 80, *(1000 + number % 999, 999, 4000) * 2, 100, number, 16])
+        for bubble in range(n):
+            self.trim.use(one, 0, bubble)
         self.settings.values[:] = array("i", [number, 1000 + number, -number])
         return self.content
 
@@ -82,7 +84,8 @@ class Device:
             for bubble, size in enumerate(self.tables.sizes)
         ]
         found = array("i", bytes(4 * trim.COUNT * self.board.BUBBLES))
-        self.trim.read(found)
+        for bubble in range(self.board.BUBBLES):
+            self.trim.read(found, trim.COUNT * bubble, bubble)
         return tuple(tables), tuple(found), tuple(self.settings.values)
 
 

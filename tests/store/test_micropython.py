@@ -57,14 +57,17 @@ def change(device, number):
         device.tables.write_size(bubble, 3 + (number + bubble) % 62)
         device.tables.write_knot(bubble, 2 + (number + bubble) % 62, 14000, 40000 + number)
     device.tables.swap()
-    device.trim.use(array("i", (150 + number, 1000 + number, 900 - number, 4000) * n))
+    one = array("i", (150 + number, 1000 + number, 900 - number, 4000, 1100 + number, 800 - number, 4100, 100, number, 16))
+    for bubble in range(n):
+        device.trim.use(one, 0, bubble)
     device.settings.values[0] = number * 100003
 
 
 def say(device):
     store = device.store
-    found = array("i", bytearray(4 * 4 * device.board.BUBBLES))
-    device.trim.read(found)
+    found = array("i", bytearray(4 * 10 * device.board.BUBBLES))
+    for bubble in range(device.board.BUBBLES):
+        device.trim.read(found, 10 * bubble, bubble)
     print(store.source, store.generation, list(store.states), list(store.wear), store.length, device.tables.crc[0])
     print(list(found), list(device.settings.values), list(device.tables.sizes))
 

@@ -37,46 +37,43 @@ class Trim:
         high = dead_us, dead_us, min(gain * 4 // 3, 65535)
         self.high = array("i", (board.SENSOR_ZERO + off,) + high + high + (SD_MAX, SD_MAX, LEAK_MAX))
 
-    def first_invalid(self, values: "array[int]", at: int = 0, count: int = -1) -> int:
-        """Where in the whole trims of `count` bubbles in `values[at:]`, or of all, a number stands that the board does not allow.
+    # A function with more than eleven locals and values at a time would allocate: one bubble at a time, then.
 
-        -1 where there is none.
-        """
-        for index in range(COUNT * (self._bubbles.count if count < 0 else count)):
-            value = values[at + index]
-            if value < self.low[index % COUNT] or value > self.high[index % COUNT]:
-                return index
+    def invalid(self, values: "array[int]", at: int) -> int:
+        """Which number of the whole trim at `values[at:]` the board does not allow, -1 where it allows all."""
+        for number in range(COUNT):
+            value = values[at + number]
+            if value < self.low[number] or value > self.high[number]:
+                return number
         return -1
 
-    def use(self, values: "array[int]", at: int = 0, first: int = 0, count: int = -1) -> None:
-        """Take up the whole trims of `count` bubbles from number `first` on, or of all, in `values[at:]`."""
-        for index in range(COUNT * (self._bubbles.count if count < 0 else count)):
-            self._bubbles.set_trim(first + index // COUNT, index % COUNT, values[at + index])
+    def use(self, values: "array[int]", at: int, bubble: int) -> None:
+        """Take up the whole trim at `values[at:]` for one bubble."""
+        for number in range(COUNT):
+            self._bubbles.set_trim(bubble, number, values[at + number])
+
+    def read(self, values: "array[int]", at: int, bubble: int) -> None:
+        """Put the whole trim of one bubble at `values[at:]`."""
+        for number in range(COUNT):
+            values[at + number] = self._bubbles.trim(bubble, number)
+
+    def widen(self, values: "array[int]", at: int, to: int) -> None:
+        """Make the `SHORT` numbers at `values[at:]` a whole trim at `values[to:]`: both valves alike, as sure as the board's.
+
+        `to` is not below `at`.
+        """
+        values[to + 3] = values[to + 6] = values[at + 3]
+        values[to + 2] = values[to + 5] = values[at + 2]
+        values[to + 1] = values[to + 4] = values[at + 1]
+        values[to] = values[at]
+        for number in range(2 * SHORT - 1, COUNT):
+            values[to + number] = self.nominal[number]
 
     def use_nominal(self) -> None:
         """Take up the board's."""
-        for at in range(COUNT * self._bubbles.count):
-            self._bubbles.set_trim(at // COUNT, at % COUNT, self.nominal[at % COUNT])
+        for bubble in range(self._bubbles.count):
+            self.use(self.nominal, 0, bubble)
 
-    def widen(self, values: "array[int]") -> None:
-        """Make trims of both valves, `SHORT` numbers a bubble in `values`, whole ones: both alike, as sure as the board's."""
-        for bubble in range(self._bubbles.count - 1, -1, -1):
-            at = bubble * SHORT
-            to = bubble * COUNT
-            zero, opens, closes, gain = values[at], values[at + 1], values[at + 2], values[at + 3]
-            for number in range(COUNT):
-                values[to + number] = self.nominal[number]
-            values[to] = zero
-            values[to + 1] = values[to + 4] = opens
-            values[to + 2] = values[to + 5] = closes
-            values[to + 3] = values[to + 6] = gain
-
-    def read_short(self, values: "array[int]") -> None:
-        """Put the first `SHORT` numbers of all bubbles in `values`: those of the fill valves."""
-        for at in range(SHORT * self._bubbles.count):
-            values[at] = self._bubbles.trim(at // SHORT, at % SHORT)
-
-    def read(self, values: "array[int]", at: int = 0, first: int = 0, count: int = -1) -> None:
-        """Put the whole trims of `count` bubbles from number `first` on, or of all, in `values[at:]`."""
-        for index in range(COUNT * (self._bubbles.count if count < 0 else count)):
-            values[at + index] = self._bubbles.trim(first + index // COUNT, index % COUNT)
+    def number(self, bubble: int, number: int) -> int:
+        """One number of one bubble's trim."""
+        return self._bubbles.trim(bubble, number)

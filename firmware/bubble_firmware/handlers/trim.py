@@ -54,11 +54,15 @@ class TrimHandlers(Handlers):
         if count != self._bubbles:
             reply.refuse(_WRONG_COUNT, 0, _NO_ELEMENT, count, self._bubbles, self._bubbles)
             return
-        self._trim.widen(reply.values)
+        for bubble in range(count - 1, -1, -1):
+            self._trim.widen(reply.values, bubble * trims.SHORT, bubble * trims.COUNT)
         self._use(0, 0, count)
 
     def _read_short(self, count: int) -> None:
-        self._trim.read_short(self._reply.values)
+        values = self._reply.values
+        for bubble in range(self._bubbles):
+            for number in range(trims.SHORT):
+                values[bubble * trims.SHORT + number] = self._trim.number(bubble, number)
         self._reply.reply(self._bubbles)
 
     def _write(self, count: int) -> None:
@@ -70,21 +74,26 @@ class TrimHandlers(Handlers):
         self._use(_CALIBRATION_ZERO, first, count)
 
     def _use(self, at: int, first: int, count: int) -> None:
-        reply = self._reply
-        values = reply.values
+        if not is_vented(self._reply, self._safety):
+            return
+        for index in range(count):
+            if self._refuses(at, index):
+                return
+        for index in range(count):
+            self._trim.use(self._reply.values, at + index * trims.COUNT, first + index)
+        self._reply.acknowledge()
+
+    def _refuses(self, at: int, index: int) -> bool:
+        """Refuse the trims at `values[at:]` where number `index` of them is not allowed."""
+        values = self._reply.values
         trim = self._trim
-        if not is_vented(reply, self._safety):
-            return
-        invalid = trim.first_invalid(values, at, count)
-        if invalid >= 0:
-            number = invalid % trims.COUNT
-            field = at + number if at else min(number, trims.SHORT - 1)
-            reply.refuse(
-                _OUT_OF_RANGE, field, invalid // trims.COUNT, values[at + invalid], trim.low[number], trim.high[number]
-            )
-            return
-        trim.use(values, at, first, count)
-        reply.acknowledge()
+        place = at + index * trims.COUNT
+        number = trim.invalid(values, place)
+        if number < 0:
+            return False
+        field = at + number if at else min(number, trims.SHORT - 1)
+        self._reply.refuse(_OUT_OF_RANGE, field, index, values[place + number], trim.low[number], trim.high[number])
+        return True
 
     def _read(self, count: int) -> None:
         reply = self._reply
@@ -93,5 +102,6 @@ class TrimHandlers(Handlers):
             reply.refuse(_OUT_OF_RANGE, _CALIBRATION_FIRST, _NO_ELEMENT, first, 0, self._bubbles - 1)
             return
         count = min(self._bubbles - first, self._most)
-        self._trim.read(reply.values, _CALIBRATION_ZERO, first, count)
+        for index in range(count):
+            self._trim.read(reply.values, _CALIBRATION_ZERO + index * trims.COUNT, first + index)
         reply.reply(count)

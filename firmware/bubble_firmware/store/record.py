@@ -67,7 +67,8 @@ class Content:
             at += 4
         start = at = _put_head(data, start, at, _SETTINGS)
         at += _SECTION
-        self._trim.read(self._trims)
+        for bubble in range(tables.bubbles):
+            self._trim.read(self._trims, bubble * trims.COUNT, bubble)
         for value in self._trims:
             put16(data, at, value)
             at += 2
@@ -89,7 +90,8 @@ class Content:
             valid = at + size <= end and self._take_section(section, data, at, size)
             at += size
         if valid:
-            self._trim.use(self._trims)
+            for bubble in range(tables.bubbles):
+                self._trim.use(self._trims, bubble * trims.COUNT, bubble)
             tables.swap()
             self._bubbles.use_tables()
         else:
@@ -143,15 +145,15 @@ class Content:
     def _take_trim(self, data: bytearray, at: int, size: int) -> bool:
         n = self._board.BUBBLES
         stride = size // (2 * n)  # words of one bubble in the record
-        if stride == trims.SHORT:  # an older record: of both valves
-            for index in range(n * stride):
-                self._trims[index] = get16(data, at + 2 * index)
-            self._trim.widen(self._trims)
-        else:
-            for bubble in range(n):
-                for number in range(min(stride, trims.COUNT)):
-                    self._trims[bubble * trims.COUNT + number] = get16(data, at + 2 * (bubble * stride + number))
-        return self._trim.first_invalid(self._trims) < 0
+        for bubble in range(n):
+            to = bubble * trims.COUNT
+            for number in range(min(stride, trims.COUNT)):
+                self._trims[to + number] = get16(data, at + 2 * (bubble * stride + number))
+            if stride == trims.SHORT:  # an older record: of both valves
+                self._trim.widen(self._trims, to, to)
+            if self._trim.invalid(self._trims, to) >= 0:
+                return False
+        return True
 
 
 def _put_head(data: bytearray, start: int, end: int, section: int) -> int:
