@@ -42,7 +42,7 @@ test: setup lint generated micropython ## every check that needs no hardware, so
 	@echo "hil_tests where bubbles touch"
 	$(BIN)/python -m pytest -q -n 2 hil_tests --target "sim://wristband7"
 	@echo "the slow tests of all else that needs no emulated chip, 2,000 scenarios of the promises among them"
-	$(BIN)/python -m pytest -n 2 -m "slow and not chip" $(COVERED:%=--ignore %)
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "slow and not chip" $(COVERED:%=--ignore %)
 
 chip: setup micropython ## build the RP2040's firmware, run its tests and hil_tests on an emulated chip, 20 minutes
 	$(BIN)/bubbleskin firmware build
