@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
 SCENARIOS = int(os.environ.get("BUBBLESKIN_SCENARIOS", "2000"))
-"""Of the slow test: `BUBBLESKIN_SCENARIOS=20000 pytest tests/promises -m slow` for a longer look, `BUBBLESKIN_SEED=6` for another."""
+"""Of the slow test: `BUBBLESKIN_SCENARIOS=20000 pytest tests/promises -m slow` looks longer, `BUBBLESKIN_SEED=6` elsewhere."""
 SEED = int(os.environ.get("BUBBLESKIN_SEED", "0"))
 FEW = 5
 STEPS = 14
