@@ -228,6 +228,22 @@ def test_a_fill_valve_that_sticks_open_on_the_way_up_empties_the_reservoir(board
     assert world.board.plant.height_mm[0] < 5.1
 
 
+@pytest.mark.parametrize("board", ["wristband7", "wristband19"])
+def test_a_reservoir_that_fills_meanwhile_takes_no_bubble_too_high(board, world):
+    """After a power cut with an empty reservoir: whoever reckons flow with what its pressure was a while ago lets too much in."""
+    world = world(board)
+    world.inject_supply("supply_stuck", 2160.0)
+    world.run(0.3)
+    world.mend()
+    world.run(0.3)
+    world.cut_power()
+    world.run(0.1)
+    assert world.board.plant.supply_pa < 20e3
+    world.show([14000, *[8000] * (world.bubbles - 1)], 0)
+    world.run(2.0)
+    assert world.board.plant.height_mm[0] > 13.8
+
+
 def test_a_fill_valve_that_stays_open_is_found(world):
     """Judged alone: a firmware that leaves one open breaks the promise of height long before."""
     world = world()
