@@ -16,10 +16,12 @@ from bubbleskin.sim.parameters import RUBBERS, PlantParameters, allowed
 from bubbleskin.sim.plant import Plant
 from bubbleskin.sim.tolerances import draw
 
+_PAPER = PlantParameters.nominal(1)
+_MU, _C2, _C3 = (float(figure[0]) for figure in (_PAPER.mu, _PAPER.c2, _PAPER.c3))
 SHEETS = {
-    "paper": (39.62e3, 417.3, 60.65),
-    "stiff25": (1.25 * 39.62e3, 417.3, 60.65),
-    "stiff50": (1.50 * 39.62e3, 417.3, 60.65),
+    "paper": (_MU, _C2, _C3),
+    "stiff25": (1.25 * _MU, _C2, _C3),
+    "stiff50": (1.50 * _MU, _C2, _C3),
     "ecoflex-00-30": (15.78e3, 91.8, 0.0),
 }
 """μ, C2 and C3 in Pa: the display paper's fit, 25 and 50 % stiffer ones that snap through, and Ecoflex 00-30 in tension
