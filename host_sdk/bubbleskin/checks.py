@@ -119,8 +119,6 @@ def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf
     if values.size != 1:
         raise InvalidInput(f"{name} must be one number, not {values.size} of them.")
     one = float(values.item())
-    if not math.isfinite(one) and (low, high) == (-math.inf, math.inf):
-        finite(name, value)
     if not (math.isfinite(one) and low <= one <= high):
         raise InvalidInput(f"{name} is {with_unit(one, unit)}; {_range(low, high, unit)} is allowed.")
     return one
@@ -137,16 +135,15 @@ def above_zero(name: str, value: Any, high: float = math.inf, unit: str = "") ->
 
 def whole(name: str, value: Any, low: int, high: int, unit: str = "") -> int:
     """``value`` as one whole number from ``low`` to ``high``."""
-    one = value if type(value) is int else None
-    if (
-        one is None and isinstance(value, np.integer) and not isinstance(value, np.timedelta64)
-    ):  # numpy counts it among them
+    if type(value) is int:
+        one = value
+    elif isinstance(value, np.integer) and not isinstance(value, np.timedelta64):  # which numpy counts among them
         one = int(value)
-    if one is None:
+    else:
         real = number(name, value)
-        if real != round(real):
-            raise InvalidInput(f"{name} is {shown(value)}, but must be a whole number.")
         one = round(real)
+        if real != one:
+            raise InvalidInput(f"{name} is {shown(value)}, but must be a whole number.")
     if not low <= one <= high:
         raise InvalidInput(f"{name} is {shown(one)}{' ' * bool(unit)}{unit}; {_range(low, high, unit)} is allowed.")
     return one
@@ -209,6 +206,8 @@ def with_unit(value: float, unit: str) -> str:
 
 def _range(low: float, high: float, unit: str) -> str:
     """What is allowed, such as '0 to 60 s'."""
+    if (low, high) == (-math.inf, math.inf):
+        return "any finite number"
     if high == math.inf:
         return f"{with_unit(low, unit)} or more"
     if low == -math.inf:

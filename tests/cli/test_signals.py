@@ -34,6 +34,7 @@ def test_ctrl_c_ends_with_130_and_no_traceback(verb):
         text=True,
         env=environment,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
     )
     said, open_ = [], threading.Event()
 
@@ -53,6 +54,7 @@ def test_ctrl_c_ends_with_130_and_no_traceback(verb):
         assert running.wait(20) == 130
     finally:
         running.kill()
+        running.wait()
         listener.join()
         running.stderr.close()
     told = "".join(said)

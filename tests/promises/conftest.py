@@ -4,8 +4,13 @@ What judges knows the plant's truth, what the valves are told, and numbers of do
 firmware it believes only which faults it tells.
 """
 
+from functools import partial
+
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, Phase, seed, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
 from bubbleskin.link import message as wire
@@ -224,7 +229,142 @@ class World:
             raise BrokenPromiseError(f"{promise}: {what}, {self.board.time:.3f} s after the start")
 
 
+# What a host or the world may do.
+
+STEPS = 14
+
+FAILURES = (
+    ("pop_off", 1.0),
+    ("leak", 3e-6),
+    ("fill_stuck", 1.0),
+    ("fill_stuck", -1.0),
+    ("vent_stuck", 1.0),
+    ("vent_stuck", -1.0),
+    ("sensor_stuck", 700.0),
+    ("sensor_stuck", 1460.0),
+    ("sensor_absent", 1.0),
+)
+SUPPLY_FAILURES = (
+    ("supply_stuck", 2160.0),
+    ("supply_stuck", 2560.0),
+    ("supply_absent", 1.0),
+    ("supply_bias", -8e3),
+    ("supply_flat", 55e3),
+)
+_heights = st.sampled_from([4000, 5500, 8000, 11000, 12500, 13500, 14000])
+_nonsense = st.sampled_from([14001, 20000, 65535])
+_durations = st.sampled_from([0.005, 0.02, 0.1, 0.3, 0.7, 1.1, 2.0])
+
+
+class Promises(RuleBasedStateMachine):
+    """Anything a host or the world may do, in any order."""
+
+    make = None  # a world
+
+    @initialize(
+        board=st.sampled_from(["wristband7", "wristband7", "wristband7", "wristband19"]),
+        seed=st.integers(0, 1000),
+        world=st.sampled_from([(False, 0.0), (False, 0.0), (True, 0.0), (False, 0.05)]),
+    )
+    def boot(self, board, seed, world):
+        contact, spread = world
+        self.world = self.make(board, seed=seed, contact=contact, spread=spread)
+
+    @rule(data=st.data(), ramp_ms=st.sampled_from([0, 0, 30, 500]), duration=_durations)
+    def show(self, data, ramp_ms, duration):
+        n = self.world.bubbles
+        heights = data.draw(_heights.map(lambda h: [h] * n) | st.lists(_heights, min_size=n, max_size=n))
+        self.world.speak()
+        self.world.show(heights, ramp_ms)
+        self.world.run(duration)
+
+    @rule(duration=_durations)
+    def stop(self, duration):
+        self.world.stop()
+        self.world.run(duration)
+
+    @rule(duration=_durations)
+    def vent(self, duration):
+        self.world.vent()
+        self.world.run(duration)
+
+    @rule(duration=_durations, pace=st.sampled_from([1, 2, 20, 60]))
+    def clear(self, duration, pace):
+        for tick in range(round(duration / self.world.board.tick_s)):
+            if not tick % pace:
+                self.world.clear()
+            self.world.tick()
+
+    @rule(failure=st.sampled_from(FAILURES), bubble=st.integers(0, 6), duration=st.sampled_from([0.3, 1.1, 2.0]))
+    def fail(self, failure, bubble, duration):
+        self.world.inject(failure[0], bubble, failure[1])
+        self.world.run(duration)
+
+    @rule(failure=st.sampled_from(SUPPLY_FAILURES), duration=_durations)
+    def fail_supply(self, failure, duration):
+        self.world.inject_supply(*failure)
+        self.world.run(duration)
+
+    @rule()
+    def mend(self):
+        self.world.mend()
+
+    @rule(bubble=st.integers(0, 6), height=_nonsense)
+    def show_what_is_not_allowed(self, bubble, height):
+        heights = [10000] * self.world.bubbles
+        heights[bubble] = height
+        self.world.show(heights, 0)
+        self.world.run(0.1)
+
+    @rule(duration=_durations, speaks=st.booleans())
+    def silence(self, duration, speaks):
+        self.world.fall_silent()
+        self.world.run(duration)
+        if speaks:
+            self.world.speak()
+            self.world.run(0.1)
+
+    @rule(pressed=st.booleans(), duration=_durations)
+    def emergency_stop(self, pressed, duration):
+        self.world.press(pressed)
+        self.world.run(duration)
+
+    @rule(duration=_durations)
+    def power_cut(self, duration):
+        self.world.cut_power()
+        self.world.run(duration)
+
+    @rule(duration=_durations)
+    def wait(self, duration):
+        self.world.run(duration)
+
+    def teardown(self):
+        if hasattr(self, "world"):
+            self.world.board.close()
+
+
+def look_at(scenarios, spoil=None, phases=tuple(Phase), share=0):
+    """At so many scenarios, others for every `share`; `spoil` takes a rule out of the firmware after each boot."""
+    machine = type("Scenario", (Promises,), {"make": staticmethod(partial(World, host=spoil))})
+    run_state_machine_as_test(
+        seed(share)(machine),
+        settings=settings(
+            max_examples=scenarios,
+            stateful_step_count=STEPS,
+            deadline=None,
+            phases=phases,
+            suppress_health_check=list(HealthCheck),
+        ),
+    )
+
+
 @pytest.fixture(scope="session")
 def world():
     """The class."""
     return World
+
+
+@pytest.fixture(scope="session")
+def look():
+    """See `look_at`."""
+    return look_at

@@ -1,9 +1,10 @@
 """Every promise judged in conftest.py against a firmware with the rule taken out that keeps it: the judge must see it.
 
-Each firmware meets one short course of events, in which the whole firmware keeps every promise.
+Each firmware meets one short course of events, in which the whole firmware keeps every promise; some meet the search, too.
 """
 
 import pytest
+from hypothesis import Phase
 
 from bubble_firmware.control import state_layout as layout
 from bubble_firmware.safety.state import HOST_QUIET, NO_EVENT
@@ -142,6 +143,17 @@ def believes_the_supply(app):
     app.supply.sense = believing
 
 
+def misreads(app):
+    """The first bubble's sensor, at the end of its range."""
+    read = app.hal.read_sensors
+
+    def wrong(counts):
+        read(counts)
+        counts[0] = 4095
+
+    app.hal.read_sensors = wrong
+
+
 # Courses of events: (seconds, what then happens).
 
 
@@ -219,3 +231,20 @@ def test_with_the_rule_the_same_is_kept(name, world):
 
 def test_every_promise_has_a_control(world):
     assert {promise for promise, _, _ in CONTROLS.values()} == set(world.promises)
+
+
+SEARCHED = {
+    "silence": deaf,
+    "pressure|height|isolation": blind,
+    "latching": heals,
+    "emergency stop": no_emergency_stop,
+    "reservoir": does_not_dump,
+    "only the ill": misreads,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("promise", SEARCHED)
+def test_the_search_finds_a_firmware_without_the_rule(promise, world, look):
+    with pytest.raises(world.Broken, match=f"^({promise}): "):
+        look(2000, SEARCHED[promise], (Phase.generate,))

@@ -159,16 +159,16 @@ def test_sensors_are_gauges_at_any_altitude(rubber):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ("rubber=wood", "rubber is 'wood'; choose one of ideal, real."),
-        ("sheet=steel", "sheet is 'steel'; choose one of paper, stiff25"),
+        ("rubber=wood", "rubber is 'wood', but must be one of 'ideal', 'real'."),
+        ("sheet=steel", "sheet is 'steel', but must be one of 'paper', 'stiff25'"),
         ("gas_c=warm", "gas_c='warm', which is not a number"),
-        ("gas_c=400", "gas_c is 400.0; give a number from -20 to 60, °C."),
-        ("atmosphere_kpa=nan", "atmosphere_kpa is nan; give a number from 50 to 120, kPa."),
-        ("viscosity=0", "viscosity is 0.0; give a number from 0.05 to 20, 1 for the nominal"),
-        ("leak=-1", "leak is -1.0; give a number from 0 to 0.5"),
-        ("springs=2", "springs is 2.0; give a number from 0 to 1"),
+        ("gas_c=400", "gas_c is 400 °C; -20 to 60 °C is allowed."),
+        ("atmosphere_kpa=nan", "atmosphere_kpa is nan kPa; 50 to 120 kPa is allowed."),
+        ("viscosity=0", "viscosity is 0 times the nominal; 0.05 to 20 times the nominal is allowed."),
+        ("leak=-1", "leak is -1 of its air a second; 0 to 0.5 of its air a second is allowed."),
+        ("springs=2", "springs is 2; 0 to 1 is allowed."),
         ("parameters=3", "has the option 'parameters'; known are seed,"),
-        ("plant=nowhere.toml", "The plant nowhere.toml cannot be read: No such file or directory."),
+        ("plant=nowhere.toml", "Cannot read the plant nowhere.toml: No such file or directory."),
         ("plant=nowhere.toml&spread=0.1&leak=0.1", "plant says all of the plant; leave out leak, spread."),
     ],
 )
@@ -242,7 +242,7 @@ def test_what_a_file_leaves_out_is_nominal_and_one_number_is_for_all(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("rubber = ideal", "is no TOML: "),
+        ("rubber = ideal", "is not readable: "),
         ('rubber = "wood"', "has rubber = 'wood'; choose one of ideal, real."),
         ("mu = 3", "has 'mu' at its top, which nothing there is called; "),
         ("supply = 3", "has supply as a figure; write [supply] on a line, and its figures below it."),
@@ -270,10 +270,15 @@ def test_a_wrong_file_is_a_sentence(text, said, tmp_path):
     assert said in str(caught.value)
 
 
+def test_parameters_that_are_none_are_a_sentence():
+    with pytest.raises(bs.InvalidInput, match="parameters is 3; give PlantParameters"):
+        SimulatedBoard(parameters=3)
+
+
 def test_what_is_no_text_and_where_nothing_can_be_written_is_a_sentence(tmp_path):
     path = tmp_path / "picture.toml"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(bs.InvalidInput, match="is no text; `skin"):
+    with pytest.raises(bs.InvalidInput, match="is not text, so it is not the plant"):
         plant_file.read(path, 7)
-    with pytest.raises(bs.InvalidInput, match=r"cannot be written to .*: No such file"):
+    with pytest.raises(bs.InvalidInput, match=r"The plant .* cannot be written: No such file"):
         plant_file.write(tmp_path / "no" / "where.toml", REAL_7)

@@ -60,9 +60,8 @@ class Grid:
         if len(self._decimal) == 2:
             comma, point = self._decimal[","], self._decimal["."]
             raise CellError(
-                f"is {shown(cell.text)}: {comma.text[:40]} in"
-                f" line {comma.line} has a decimal comma and {point.text[:60]} in line "
-                f"{point.line} a point. Write all with points"
+                f"is {shown(cell.text)}: {comma.text[:40]} in line {comma.line} has a decimal comma and "
+                f"{point.text[:40]} in line {point.line} a point. Write all with points"
             )
         value = float(text.replace(",", "."))
         if not math.isfinite(value):

@@ -63,25 +63,26 @@ def pack(name: str, sequence: int, fixed: Sequence[int], repeated: Sequence[Sequ
         raise InvalidInput(f"{name} takes numbers and a few rows of them, not {shown(repeated)}.")
     try:
         return struct_codec.pack(sequence, fixed, repeated)
-    except (
-        struct.error,
-        TypeError,
-    ):  # a number beyond its kind: the codec keeps its low bits, and the device refuses what they say
-        message = struct_codec.message
-        try:
-            given = list(chain(fixed, *repeated))
-        except TypeError:
-            raise InvalidInput(f"{name} takes rows of numbers, not {shown(repeated)}.") from None
-        wanted = message.fixed_values + len(repeated) * message.stride_values
-        if len(given) != wanted:
-            raise InvalidInput(f"{name} takes {wanted} values, not {len(given)}.") from None
-        for value in given:
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or isinstance(value, np.timedelta64):
-                raise InvalidInput(f"{name} takes whole numbers; {shown(value)} is none.") from None
-        values = array("i", map(signed_word, given))
-        payload = bytearray(max(FRAME_MAX, 4 * wanted))
-        end = message.pack(values, len(repeated), payload, 0)
-        return struct.pack("<BH", message.id, sequence & 0xFFFF) + payload[:end]
+    except (struct.error, TypeError):
+        payload = _low_bits(struct_codec.message, fixed, repeated)
+        return struct.pack("<BH", struct_codec.message.id, sequence & 0xFFFF) + payload
+
+
+def _low_bits(message: codec.Message, fixed: Sequence[int], repeated: Sequence[Sequence[int]]) -> bytes:
+    """The payload where a number is beyond its kind: its low bits, as of the device's codec; the device refuses what they say."""
+    try:
+        given = list(chain(fixed, *repeated))
+    except TypeError:
+        raise InvalidInput(f"{message.name} takes rows of numbers, not {shown(repeated)}.") from None
+    wanted = message.fixed_values + len(repeated) * message.stride_values
+    if len(given) != wanted:
+        raise InvalidInput(f"{message.name} takes {wanted} values, not {len(given)}.")
+    for value in given:
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or isinstance(value, np.timedelta64):
+            raise InvalidInput(f"{message.name} takes whole numbers; {shown(value)} is none.")
+    payload = bytearray(4 * wanted)  # none takes more than four bytes
+    end = message.pack(array("i", map(signed_word, given)), len(repeated), payload, 0)
+    return bytes(payload[:end])
 
 
 def numbered(content: bytes, sequence: int, key: bytes) -> bytes:

@@ -137,26 +137,22 @@ class PlantParameters:
 
 ANY_SIGN = ("sensor_offset", "neck")
 MAY_BE_ZERO = (
-    *(
-        "c2",
-        "c3",
-        "leak",
-        "critical_ratio",
-        "fill_opening",
-        "fill_closing",
-        "vent_opening",
-        "vent_closing",
-        "sensor_noise",
-    ),
-    *(
-        "fill_conductance",
-        "vent_conductance",
-        "dump_conductance",
-        "pump_free_flow",
-        "mullins",
-        "quick_strength",
-        "slow_strength",
-    ),
+    "c2",
+    "c3",
+    "leak",
+    "critical_ratio",
+    "fill_opening",
+    "fill_closing",
+    "vent_opening",
+    "vent_closing",
+    "sensor_noise",
+    "fill_conductance",
+    "vent_conductance",
+    "dump_conductance",
+    "pump_free_flow",
+    "mullins",
+    "quick_strength",
+    "slow_strength",
 )
 """Figures that may be negative, and those that may be nothing; all others are more than 0."""
 BELOW_ONE = ("critical_ratio", "mullins")

@@ -12,7 +12,6 @@ TOML, all in SI units and by the names of `PlantParameters` and `Supply`:
 What a file leaves out is nominal. `write` leaves out nothing, and `read` of what it wrote is the same to the last bit.
 """
 
-import tomllib
 from dataclasses import asdict, fields
 from difflib import get_close_matches
 from pathlib import Path
@@ -21,6 +20,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import parse_toml, read_text, write_text
 from bubbleskin.sim.parameters import RUBBERS, PlantParameters, Supply, allowed
 
 _SECTIONS = ("rubber", "supply", "bubbles")
@@ -36,26 +36,12 @@ def write(path: str | Path, parameters: PlantParameters, about: str = "") -> Non
     lines += ["", "[bubbles]"]
     for name in PlantParameters.each():
         lines.append(f"{name} = [{', '.join(map(_text, getattr(parameters, name)))}]")
-    try:
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InvalidInput(f"The plant cannot be written to {path}: {error.strerror}.") from None
+    write_text(path, "\n".join(lines) + "\n", "the plant")
 
 
 def read(path: str | Path, n: int) -> PlantParameters:
     """The plant in the file `path`, of `n` bubbles; `InvalidInput` says where it is wrong and what may stand there."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InvalidInput(f"The plant {path} cannot be read: {error.strerror}.") from None
-    except UnicodeDecodeError:
-        raise InvalidInput(
-            f"The plant {path} is no text; `skin.simulated.write_plant({str(path)!r})` makes one."
-        ) from None
-    try:
-        said = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidInput(f"The plant {path} is no TOML: {error}.") from None
+    said = parse_toml(read_text(path, "the plant"), f"The plant {path}")
     for name in said:
         if name not in _SECTIONS:
             _unknown(path, name, "at its top", _SECTIONS)

@@ -1,6 +1,5 @@
 """From what somebody asks of a simulated board to the plant behind it."""
 
-import math
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import ModuleType
@@ -8,6 +7,7 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
+from bubbleskin import checks
 from bubbleskin.contact.model import CompliantContact
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
@@ -16,10 +16,12 @@ from bubbleskin.sim.parameters import RUBBERS, PlantParameters, allowed
 from bubbleskin.sim.plant import Plant
 from bubbleskin.sim.tolerances import draw
 
+_PAPER = PlantParameters.nominal(1)
+_MU, _C2, _C3 = (float(figure[0]) for figure in (_PAPER.mu, _PAPER.c2, _PAPER.c3))
 SHEETS = {
-    "paper": (39.62e3, 417.3, 60.65),
-    "stiff25": (1.25 * 39.62e3, 417.3, 60.65),
-    "stiff50": (1.50 * 39.62e3, 417.3, 60.65),
+    "paper": (_MU, _C2, _C3),
+    "stiff25": (1.25 * _MU, _C2, _C3),
+    "stiff50": (1.50 * _MU, _C2, _C3),
     "ecoflex-00-30": (15.78e3, 91.8, 0.0),
 }
 """μ, C2 and C3 in Pa: the display paper's fit, 25 and 50 % stiffer ones that snap through, and Ecoflex 00-30 in tension
@@ -54,11 +56,11 @@ class PlantOptions(TypedDict, total=False):
 
 
 NUMBERS = {
-    "springs": (0.0, 1.0, "a share such as 0.3 for ± 30 %"),
+    "springs": (0.0, 1.0, ""),
     "atmosphere_kpa": (50.0, 120.0, "kPa"),
     "gas_c": (-20.0, 60.0, "°C"),
-    "viscosity": (0.05, 20.0, "1 for the nominal, 3 for three times that"),
-    "leak": (0.0, 0.5, "a share of a full bubble's air per second, such as 0.01"),
+    "viscosity": (0.05, 20.0, "times the nominal"),
+    "leak": (0.0, 0.5, "of its air a second"),
 }
 """Limits of each number, and its unit."""
 
@@ -105,12 +107,9 @@ def _check(spread: float, options: PlantOptions) -> None:
         if name not in PlantOptions.__annotations__:
             raise InvalidInput(f"A plant has no option {name!r}; known are {', '.join(PlantOptions.__annotations__)}.")
     for name, choice in (("rubber", RUBBERS), ("sheet", tuple(SHEETS))):
-        if options.get(name, choice[0]) not in choice:
-            raise InvalidInput(f"{name} is {options.get(name)!r}; choose one of {', '.join(choice)}.")
+        checks.one_of(name, options.get(name, choice[0]), choice)
     for name, (least, most, unit) in NUMBERS.items():
-        value = options.get(name, least)
-        if not (isinstance(value, int | float) and math.isfinite(value) and least <= value <= most):
-            raise InvalidInput(f"{name} is {value}; give a number from {least:g} to {most:g}, {unit}.")
+        checks.number(name, options.get(name, least), least, most, unit)
     whole = [name for name in _WHOLE if name in options]
     others = [name for name in options if name not in _WHOLE] + ["spread"] * bool(spread)
     if whole and (others or len(whole) > 1):
@@ -118,6 +117,7 @@ def _check(spread: float, options: PlantOptions) -> None:
 
 
 def _checked(parameters: PlantParameters, n: int) -> PlantParameters:
+    checks.instance("parameters", parameters, PlantParameters, "PlantParameters, such as PlantParameters.nominal(7)")
     for name in PlantParameters.each():
         values = np.asarray(getattr(parameters, name))
         if values.shape != (n,):

@@ -22,9 +22,8 @@ def push(place, barbs, constants, pairs, force, h):  # type: ignore[no-untyped-d
         force[i, 0] = p.kxy * (barbs[i, 0] - place[i, 0])
         force[i, 1] = p.kxy * (barbs[i, 1] - place[i, 1])
         force[i, 2] = -stiffness * lift
-        force[i, 3] = (
-            -stiffness * lift
-        )  # a larger sphere is lifted less: the neck's pull helps the air, the base's push does not
+        # A larger sphere is lifted less: the neck's pull helps the air, the base's push does not.
+        force[i, 3] = force[i, 2]
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         dx, dy, dz = place[i, 0] - place[j, 0], place[i, 1] - place[j, 1], place[i, 2] - place[j, 2]
