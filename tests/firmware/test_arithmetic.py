@@ -77,7 +77,7 @@ def test_a_curve_says_of_the_table_what_a_sphere_holds(name):
     assert np.abs(knots[:, layout.KNOT_PRESSURE] - np.interp(h, made.height_um, made.pressure_pa)).max() <= 1
 
     heights = np.arange(5000.0, 14000.0, 7.0)
-    exact = 64 * volume(heights)
+    exact = 65.536 * volume(heights)
     slope = np.diff(knots[:, layout.KNOT_VOLUME]) / np.diff(h)
     off = (
         np.abs(np.interp(heights, h, knots[:, layout.KNOT_VOLUME]) - exact)
@@ -86,6 +86,8 @@ def test_a_curve_says_of_the_table_what_a_sphere_holds(name):
     print(f"{name}: volume within {off.max():.1f} µm of height")
     assert off.max() < (35 if name == "sparse" else 6)
     assert knots[:-1, layout.KNOT_SLOPE] == pytest.approx(256 * slope, rel=2e-3)
+    rise = 4096 * np.diff(knots[:, layout.KNOT_PRESSURE]) / np.diff(knots[:, layout.KNOT_HEIGHT])
+    assert knots[:-1, layout.KNOT_RISE] == pytest.approx(rise.clip(-65536, 65536), abs=1)
     assert knots[:-1, layout.KNOT_RECIPROCAL] == pytest.approx(2**28 / knots[:-1, layout.KNOT_SLOPE], abs=1)
 
 

@@ -9,7 +9,7 @@ from array import array
 
 from bubble_firmware.control import curve, flow, reference, trajectory
 from bubble_firmware.control.dose import dose
-from bubble_firmware.control.estimate import estimate, restart
+from bubble_firmware.control.estimate import deviations, estimate, restart
 from bubble_firmware.control.table import KNOTS_MAX
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const, micropython, ptr32, uint
 
@@ -34,24 +34,24 @@ _CURVE_SD = const(8)
 _PRESSURE = const(10)
 _QUIESCENT = const(12)
 _AIR = const(16)
-_STATUS = const(28)
-_FAULTS = const(29)
-_TARGET = const(30)
-_HEIGHT = const(31)
-_HEIGHT_SEGMENT = const(32)
+_STATUS = const(25)
+_HEIGHT = const(26)
+_HEIGHT_SEGMENT = const(27)
+_RAMPING = const(30)
 _SETPOINT = const(33)
-_SETPOINT_SEGMENT = const(36)
-_RAMP_START = const(40)
-_RAMPING = const(41)
+_FAULTS = const(36)
+_TARGET = const(37)
+_SETPOINT_SEGMENT = const(38)
+_RAMP_START = const(42)
 _FIRST_SEGMENT = const(44)
 _LAST_SEGMENT = const(45)
 _AIR_SD = const(49)
 _CURVE_ERROR_SD = const(51)
 _HEIGHT_SD = const(53)
 _DWELL_SLOPE = const(56)
-_ROW_WORDS = const(69)
+_ROW_WORDS = const(70)
 _KNOT_VOLUME = const(1)
-_KNOT_WORDS = const(5)
+_KNOT_WORDS = const(6)
 _BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _PA_PER_COUNT = const(2)
@@ -148,12 +148,26 @@ class Bubbles:
         self.rows = view[_ROWS:curves]
         self.curves = view[curves:]
         self._tables = tables
-        self._dead_volume = 64 * board.DEAD_VOLUME_MM3
+        self._dead_volume = 65536 * board.DEAD_VOLUME_MM3 // 1000
         self._take_up_board(board)
         self.use_tables()
         rows = self.rows
         for at in range(0, n * _ROW_WORDS, _ROW_WORDS):
-            rows[at + _AIR] = (_ATMOSPHERE >> 4) * self.curves[rows[at + _FIRST_SEGMENT] // 4 + _KNOT_VOLUME] // 4000
+            rows[at + _AIR] = (_ATMOSPHERE >> 4) * self.curves[rows[at + _FIRST_SEGMENT] // 4 + _KNOT_VOLUME] >> 12
+
+        def refer(
+            found: int,
+            rows: memoryview = self.rows,
+            state: "array[int]" = state,
+            compare: "Callable[..., int]" = reference.compare,
+        ) -> None:
+            """What is seldom to be done between `estimate` and what follows it."""
+            if found >= _RESTART:
+                restart(rows, state)
+                found -= _RESTART
+            if found and compare(rows, state, found):
+                reference.fade(rows, state, found)
+                reference.correct(rows, state, found)
 
         # A default is a local: an attribute costs the chip 2.5 µs. More than 11 locals and values, and a call allocates.
         work = (self.state, estimate, trajectory.move_setpoints, dose, self.pulses)
@@ -164,7 +178,7 @@ class Bubbles:
             control_mode: int,
             rows: memoryview = self.rows,
             work: "tuple[Any, ...]" = work,
-            refer: "Callable[[int], None]" = self._refer,
+            refer: "Callable[[int], None]" = refer,
         ) -> None:
             found = work[1](rows, work[0], counts, supply_pa, control_mode)
             if found:
@@ -173,17 +187,6 @@ class Bubbles:
             work[3](rows, work[0], work[4], control_mode)
 
         self.step = step
-
-    def _refer(self, found: int) -> None:
-        """What is seldom to be done between `estimate` and what follows it."""
-        rows = self.rows
-        state = self.state
-        if found >= _RESTART:
-            restart(rows, state)
-            found -= _RESTART
-        if found and reference.compare(rows, state, found):
-            reference.fade(rows, state, found)
-            reference.correct(rows, state, found)
 
     def _take_up_board(self, board: "ModuleType") -> None:
         state = self.state
@@ -249,6 +252,7 @@ class Bubbles:
 
     def set_targets(self, heights: "Words", at: int, ticks: int) -> None:
         """Ramp every bubble from where it is to the height (µm) in `heights[at:]` within `ticks` ticks."""
+        deviations(self.rows, self.state)
         trajectory.set_targets(self.rows, heights, at, self.count, self.state[_REZERO_UM] if ticks <= 1 else 0)
         self._ramp(ticks)
 
@@ -308,6 +312,7 @@ class Bubbles:
 
     def pack_estimate(self, values: "Words", at: int) -> None:
         """Put the repeated fields of ESTIMATE at `values[at:]`."""
+        deviations(self.rows, self.state)
         _pack_estimate(self.rows, values, at, self.count)
 
     def pack_fields(self, values: "Words", plan: "Words", at: int, columns: int) -> int:
@@ -315,5 +320,6 @@ class Bubbles:
 
         `plan` names `columns` words of a row, and from its tenth place on by how many bits each is shifted right.
         """
+        deviations(self.rows, self.state)
         _pack_fields(self.rows, values, plan, at, columns, self.count)
         return columns * self.count

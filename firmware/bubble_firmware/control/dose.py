@@ -19,27 +19,27 @@ _PRESSURE = const(10)
 _QUIESCENT = const(12)
 _SETTLING_US = const(15)
 _AIR = const(16)
-_AIR_IN_FLIGHT = const(18)
-_FILL_FLOW = const(19)
-_VENT_FLOW = const(20)
-_FILL_US = const(21)
-_VENT_US = const(22)
-_DUE = const(27)
-_STATUS = const(28)
-_FAULTS = const(29)
-_TARGET = const(30)
-_HEIGHT = const(31)
+_AIR_IN_FLIGHT = const(17)
+_FILL_FLOW = const(18)
+_VENT_FLOW = const(19)
+_FILL_US = const(20)
+_VENT_US = const(21)
+_DUE = const(24)
+_STATUS = const(25)
+_HEIGHT = const(26)
+_SETPOINT_AIR = const(28)
+_PREVIOUS_SETPOINT_AIR = const(29)
+_RAMPING = const(30)
 _SETPOINT = const(33)
-_SETPOINT_AIR = const(34)
-_PREVIOUS_SETPOINT_AIR = const(35)
-_SETPOINT_SLOPE = const(39)
-_RAMPING = const(41)
-_FILL_RUN_US = const(42)
-_ERROR = const(43)
+_ERROR = const(34)
+_FAULTS = const(36)
+_TARGET = const(37)
+_SETPOINT_SLOPE = const(41)
+_FILL_RUN_US = const(43)
 _EMPTY_TICKS = const(48)
-_HEIGHT_SD = const(53)
+_AIR_SD = const(49)
 _REZERO = const(62)
-_ROW_WORDS = const(69)
+_ROW_WORDS = const(70)
 _BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _FILL_MAX_US = const(6)
@@ -52,6 +52,7 @@ _SETTLED_UM = const(13)
 _REST_UM = const(14)
 _ATMOSPHERE_PA = const(23)
 _SURE_UM = const(24)
+_HELD = const(2)
 _DOSE_MAX = const(50000)
 _VENT = const(0)
 _FOLLOW = const(1)
@@ -63,6 +64,9 @@ _FAULT = const(4)
 _UNSURE = const(5)
 _VALVE_TIME = const(4)
 # [end of constants]
+
+
+_FAR_PERIODS = const(3)  # with so much to do, it does not matter whether it is looked at in every tick or every other
 
 
 @micropython.viper
@@ -125,22 +129,23 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                 row[_PREVIOUS_SETPOINT_AIR] = row[_AIR]
                 row[_ERROR] = 0
             else:
+                deadband = (row[_PRESSURE] + atmosphere >> 4) * (row[_SETPOINT_SLOPE] * board[_DEADBAND_UM] >> 8) >> 12
                 off = row[_TARGET] - (row[_HEIGHT] >> 4)
                 row[_STATUS] = _MOVING
                 if row[_RAMPING] == 0 and (board[_SETTLED_UM] - off | board[_SETTLED_UM] + off) >> 31 == 0:
-                    row[_STATUS] = _SETTLED if row[_HEIGHT_SD] <= board[_SURE_UM] else _UNSURE
+                    sure = row[_AIR_SD] * board[_DEADBAND_UM] <= deadband * board[_SURE_UM]
+                    row[_STATUS] = _SETTLED if sure else _UNSURE
 
                 # The air that is missing, and what the setpoint's own motion asks for: feed-forward.
                 ahead = row[_SETPOINT_AIR] - row[_PREVIOUS_SETPOINT_AIR]
                 error = row[_PREVIOUS_SETPOINT_AIR] - row[_AIR] - in_flight - tail
                 row[_PREVIOUS_SETPOINT_AIR] = row[_SETPOINT_AIR]
                 row[_QUIESCENT] = 0
+                unasked = 0
+                far = 0
                 if row[_RAMPING] == 0:
                     error += ahead
                     ahead = 0
-                deadband = (
-                    (row[_PRESSURE] + atmosphere >> 4) * (row[_SETPOINT_SLOPE] * board[_DEADBAND_UM] >> 8) // 4000
-                )
                 if ahead | (deadband - error | deadband + error) >> 31 != 0:
                     want = error * board[_GAIN_P] + (error - row[_ERROR]) * board[_GAIN_D]
                     want = ahead + (want >> 8)
@@ -160,21 +165,28 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                         delay = 0
                     if size > _DOSE_MAX:
                         size = _DOSE_MAX
-                    width = size * 16000 // flow + delay
+                    width = 0
+                    if flow:
+                        width = size * 16000 // flow + delay
+                    else:
+                        unasked = 1  # what this valve would bring: the next tick asks
+                    far = 1 if opened and width > _FAR_PERIODS * tick else 0
                     shortest = board[_PULSE_MIN_US]
                     if width > tick - shortest:  # too short a gap to close in
                         width = tick if width > tick - (shortest >> 1) else tick - shortest
                     elif opened == 0 and width < shortest:
                         # Of open time, five eighths of that or more are worth a pulse: with half, one may call for its opposite.
-                        width = shortest if 8 * (width - delay) >= 5 * (shortest - delay) else 0
+                        width = shortest if 8 * (width - delay) >= 5 * (shortest - delay) and flow else 0
                     if width < 0:
                         width = 0
                     if want > 0:
                         fill = width
                     else:
                         vent = width
-                if energised | in_flight | row[_RAMPING] | fill | vent == 0:
+                if energised | in_flight | row[_RAMPING] | fill | vent | unasked == 0:
                     row[_QUIESCENT] = 1
+                elif far:
+                    row[_QUIESCENT] = _HELD
                 row[_ERROR] = error
             row[_FILL_US] = fill
             row[_VENT_US] = vent

@@ -5,9 +5,10 @@ Air is metered: what the valves have brought in the period that ended is the tim
 the flows at its beginning and end, see `flow`. Height follows from air by the gas law: V = A/(p0 + P) - V_line. No membrane is
 in it. What is known of the membrane corrects the air now and then, see `reference`.
 
-A *quiescent* bubble has its limits looked at in every tick, but it is measured and decided upon only when the mean of eight
-readings of its quiet line is there. Whatever asks something else of a bubble ends that. `DUE` says for the passes that
-follow whether a bubble is decided upon in this tick.
+A *quiescent* bubble has its limits looked at in every tick, but it is measured and decided upon only when a mean of its quiet
+line is there: of eight readings, later of 32. A *held* bubble is far from where it goes to: its valve stays open for a period
+more, which is not decided upon. Whatever asks something else of a bubble ends both. `DUE` says for the passes that follow
+whether a bubble is decided upon in this tick.
 """
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
@@ -29,19 +30,22 @@ _READINGS = const(13)
 _READINGS_SUM = const(14)
 _SETTLING_US = const(15)
 _AIR = const(16)
-_AIR_METERED = const(17)
-_AIR_IN_FLIGHT = const(18)
-_FILL_FLOW = const(19)
-_VENT_FLOW = const(20)
-_FILL_US = const(21)
-_FILL_OPEN_US = const(23)
-_FILL_FULL = const(25)
-_VENT_FULL = const(26)
-_DUE = const(27)
-_STATUS = const(28)
-_FAULTS = const(29)
-_HEIGHT = const(31)
-_HEIGHT_SEGMENT = const(32)
+_AIR_IN_FLIGHT = const(17)
+_FILL_FLOW = const(18)
+_VENT_FLOW = const(19)
+_FILL_US = const(20)
+_FILL_FULL = const(22)
+_VENT_FULL = const(23)
+_DUE = const(24)
+_STATUS = const(25)
+_HEIGHT = const(26)
+_HEIGHT_SEGMENT = const(27)
+_SETPOINT_AIR = const(28)
+_FILL_OPEN_US = const(31)
+_VENT_OPEN_US = const(32)
+_AIR_METERED = const(35)
+_FAULTS = const(36)
+_FILL_RUN_US = const(43)
 _FIRST_SEGMENT = const(44)
 _LAST_SEGMENT = const(45)
 _OVERPRESSURE_TICKS = const(46)
@@ -59,12 +63,13 @@ _LEAKED = const(61)
 _REZERO = const(62)
 _LEAK_TICK = const(63)
 _FAR = const(64)
-_ROW_WORDS = const(69)
+_READINGS_BITS = const(69)
+_ROW_WORDS = const(70)
 _KNOT_HEIGHT = const(0)
 _KNOT_VOLUME = const(1)
 _KNOT_PRESSURE = const(2)
 _KNOT_RECIPROCAL = const(4)
-_KNOT_WORDS = const(5)
+_KNOT_WORDS = const(6)
 _BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _PA_PER_COUNT = const(2)
@@ -80,10 +85,12 @@ _ROOTS = const(27)
 _ROOT_STEPS = const(64)
 _ROWS = const(157)
 _READINGS_MIN = const(2)
-_READINGS_MEAN = const(8)
+_READINGS_BITS_FIRST = const(3)
+_READINGS_BITS_NEXT = const(5)
 _AIR_SD_MAX = const(60000)
 _EMPTY_PA = const(1000)
 _EMPTY_US = const(15000)
+_HELD = const(2)
 _RESTART = const(256)
 _ROOT_END = const(8191)
 _OVERPRESSURE = const(1)
@@ -93,11 +100,11 @@ _ABSENT = const(65535)
 
 _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps every product of control within 32 bits
 _AIR_SD_EMPTY = const(200)  # µJ
+_ABSOLUTE_MIN = const(3000)  # 16 Pa
 _FAR_PA = const(10000)
 _FAR_MOVING_PA = const(15000)  # with what tube, rubber and steep curve add while it moves
 _FAR_MAX = const(3)  # ticks
 _AIR_SD_FAR = const(20000)
-_HEIGHT_SD_FAR = const(1000)  # µm
 
 
 @micropython.viper
@@ -150,11 +157,11 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
 
         # Due?
         due = 1
-        if row[_QUIESCENT] & same:
+        if row[_QUIESCENT] == 1 and same:
             if row[_SETTLING_US] > 0:
                 row[_SETTLING_US] = row[_SETTLING_US] - tick
                 due = 0
-            elif row[_READINGS] < _READINGS_MEAN:
+            elif row[_READINGS] < 1 << row[_READINGS_BITS]:
                 row[_READINGS] = row[_READINGS] + 1
                 row[_READINGS_SUM] = row[_READINGS_SUM] + pressure
                 due = 0
@@ -163,69 +170,82 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             else:
                 if row[_VENT_FULL] == 0:
                     chosen = i + 1
-                pressure = row[_READINGS_SUM] >> 3
+                pressure = row[_READINGS_SUM] >> row[_READINGS_BITS]
                 row[_QUIET_PRESSURE] = pressure
                 row[_READINGS] = 0
                 row[_READINGS_SUM] = 0
+                row[_READINGS_BITS] = _READINGS_BITS_NEXT
         else:
             row[_READINGS] = 0
             row[_READINGS_SUM] = 0
+            row[_READINGS_BITS] = _READINGS_BITS_FIRST
+            if row[_QUIESCENT] == _HELD and same:
+                row[_QUIESCENT] = 0
+                row[_FILL_RUN_US] = row[_FILL_RUN_US] + row[_FILL_US]
+                if row[_FILL_US]:
+                    row[_FILL_OPEN_US] = row[_FILL_OPEN_US] + tick
+                else:
+                    row[_VENT_OPEN_US] = row[_VENT_OPEN_US] + tick
+                due = 0
         row[_DUE] = due
         row[_AIR_METERED] = 0
 
         if due:
-            # Air: what each valve has brought in the period that ended, and what it brings in the one that begins.
+            # Air: what each valve has brought in the period that ended, and what it brings in the one that begins. A valve
+            # that does nothing is looked at only where the setpoint is on its side.
             metered = 0
             in_flight = 0
+            missing = row[_SETPOINT_AIR] - row[_AIR]
             valve = 0
             while valve < 2:
-                trim = ptr32(uint(row) + 12 * valve)  # of this valve
                 state = ptr32(uint(row) + 4 * valve)
-                before = state[_FILL_FLOW]
-                was_open = state[_FILL_FULL]
-                at = row[_PRESSURE]
-                if valve == 0:
-                    if was_open == 0:
-                        at += board[_TUBE_PA] * before >> 4  # which the tube will lose once air flows
-                    at = (supply - at) * supply_reciprocal >> 16
-                    scale = supply_scale
-                else:
-                    if was_open == 0:
-                        at -= board[_TUBE_PA] * before >> 4
-                    at >>= 3
-                    scale = 1 << 14
-                if at >> 13:
-                    at = _ROOT_END if at > 0 else 0
-                part = at & 127
-                at >>= 7
-                if valve:
-                    at += _ROOT_STEPS + 1
-                roots = ptr32(uint(board) + 4 * at)
-                root = scale * (roots[_ROOTS] + ((roots[_ROOTS + 1] - roots[_ROOTS]) * part >> 7)) >> 14
-                flow = (root * trim[_FILL_GAIN] >> 12) + 1
-                state[_FILL_FLOW] = flow
                 energised = state[_FILL_US]
                 open_us = state[_FILL_OPEN_US]
-                if open_us | energised | was_open:
-                    moved = ((before + flow) * open_us >> 13) * 16777 >> 16
-                    open_us = 0
-                    if energised:
-                        open_us = energised if was_open else energised - trim[_FILL_OPENS_US]
-                    if energised < tick and energised | was_open:
-                        open_us += trim[_FILL_CLOSES_US]
-                    open_us &= ~(open_us >> 31)  # not below 0
-                    state[_FILL_OPEN_US] = open_us
-                    state[_FILL_FULL] = 1 if energised == tick else 0
-                    coming = (flow * open_us >> 12) * 16777 >> 16
+                was_open = state[_FILL_FULL]
+                active = open_us | energised | was_open
+                flow = 0
+                if active or missing > 0:
+                    before = state[_FILL_FLOW]
+                    trim = ptr32(uint(row) + 12 * valve)  # of this valve
+                    at = row[_PRESSURE]
+                    if valve == 0:
+                        if was_open == 0:
+                            at += board[_TUBE_PA] * before >> 4  # which the tube will lose once air flows
+                        at = (supply - at) * supply_reciprocal >> 16
+                        scale = supply_scale
+                    else:
+                        if was_open == 0:
+                            at -= board[_TUBE_PA] * before >> 4
+                        at >>= 3
+                        scale = 1 << 14
+                    if at >> 13:
+                        at = _ROOT_END if at > 0 else 0
+                    part = at & 127
+                    at >>= 7
                     if valve:
-                        moved = 0 - moved
-                        coming = 0 - coming
-                    metered += moved
-                    in_flight += coming
-                    if moved:
-                        if moved < 0:
-                            moved = 0 - moved
-                        row[_AIR_SD] = row[_AIR_SD] + (moved * row[_FLOW_SD] >> 16) + (10 if energised == 0 else 0)
+                        at += _ROOT_STEPS + 1
+                    roots = ptr32(uint(board) + 4 * at)
+                    at = roots[_ROOTS]
+                    root = scale * (at + ((roots[_ROOTS + 1] - at) * part >> 7)) >> 14
+                    flow = (root * trim[_FILL_GAIN] >> 12) + 1
+                    if active:
+                        if open_us:
+                            moved = ((before + flow) * open_us >> 13) * 16777 >> 16
+                            row[_AIR_SD] = row[_AIR_SD] + (moved * row[_FLOW_SD] >> 16) + (10 if energised == 0 else 0)
+                            metered += 0 - moved if valve else moved
+                            open_us = 0
+                        if energised:
+                            open_us = energised if was_open else energised - trim[_FILL_OPENS_US]
+                        if energised < tick and energised | was_open:
+                            open_us += trim[_FILL_CLOSES_US]
+                        open_us &= ~(open_us >> 31)  # not below 0
+                        state[_FILL_OPEN_US] = open_us
+                        state[_FILL_FULL] = 1 if energised == tick else 0
+                        if open_us:
+                            coming = (flow * open_us >> 12) * 16777 >> 16
+                            in_flight += 0 - coming if valve else coming
+                state[_FILL_FLOW] = flow
+                missing = 0 - missing
                 valve += 1
             row[_AIR_IN_FLIGHT] = in_flight
             if row[_LEAK_RATE]:
@@ -247,7 +267,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 else:
                     segment = row[_FIRST_SEGMENT]
                     knot = ptr32(uint(curves) + segment)
-                    air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] // 4000
+                    air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] >> 12
                     row[_AIR_SD] = _AIR_SD_EMPTY
                     row[_REZERO] = 0
                     row[_LEAKED] = 0
@@ -267,9 +287,9 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                     absolute -= board[_TUBE_PA] * row[_FILL_FLOW] >> 4
                 else:
                     absolute += board[_TUBE_PA] * row[_VENT_FLOW] >> 4
-            absolute = absolute * 8389 >> 17
-            if absolute < 5000:
-                absolute = 5000
+            absolute >>= 4
+            if absolute < _ABSOLUTE_MIN:
+                absolute = _ABSOLUTE_MIN
             volume = (air << 12) // absolute
             knot = ptr32(uint(curves) + segment)
             off = volume - knot[_KNOT_VOLUME]
@@ -303,10 +323,25 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             row[_HEIGHT_SEGMENT] = segment
             if height > row[_PEAK]:
                 row[_PEAK] = height
-            row[_HEIGHT_SD] = (((row[_AIR_SD] << 12) // absolute >> 4) * (knot[_KNOT_RECIPROCAL] >> 8) >> 8) + 15
         i += 1
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
     return chosen | found
+
+
+@micropython.viper
+def deviations(row: ptr32, board: ptr32):
+    """Find how well every bubble's height is known: `HEIGHT_SD`. The tick does without, so it is found when somebody asks."""
+    n = board[_BUBBLE_COUNT]
+    curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
+    while n > 0:
+        absolute = row[_PRESSURE] + board[_ATMOSPHERE_PA] >> 4
+        if absolute < _ABSOLUTE_MIN:
+            absolute = _ABSOLUTE_MIN
+        knot = ptr32(uint(curves) + row[_HEIGHT_SEGMENT])
+        volume = (row[_AIR_SD] << 12) // absolute
+        row[_HEIGHT_SD] = ((volume >> 4) * (knot[_KNOT_RECIPROCAL] >> 8) >> 8) + 15
+        row = ptr32(uint(row) + 4 * _ROW_WORDS)
+        n -= 1
 
 
 @micropython.viper
@@ -351,9 +386,8 @@ def restart(row: ptr32, board: ptr32):
             row[_HEIGHT] = knot[_KNOT_HEIGHT] + (off * (knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT]) >> 10)
             row[_HEIGHT_SEGMENT] = segment
             volume = knot[_KNOT_VOLUME] + (off * (knot[_KNOT_WORDS + _KNOT_VOLUME] - knot[_KNOT_VOLUME]) >> 10)
-            row[_AIR] = (pressure + board[_ATMOSPHERE_PA] >> 4) * volume // 4000
+            row[_AIR] = (pressure + board[_ATMOSPHERE_PA] >> 4) * volume >> 12
             row[_AIR_SD] = _AIR_SD_FAR
-            row[_HEIGHT_SD] = _HEIGHT_SD_FAR
             row[_CORRELATION] = 0
             row[_CURVE_ERROR] = 0
             row[_CURVE_ERROR_SD] = row[_CURVE_SD]

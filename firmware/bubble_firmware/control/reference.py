@@ -18,8 +18,8 @@ from bubble_protocol.mpy_compat import const, micropython, ptr32, uint
 # [constants] bubble_firmware.control.state_layout: used
 _CURVE_SD = const(8)
 _AIR = const(16)
-_HEIGHT = const(31)
-_HEIGHT_SEGMENT = const(32)
+_HEIGHT = const(26)
+_HEIGHT_SEGMENT = const(27)
 _FIRST_SEGMENT = const(44)
 _LAST_SEGMENT = const(45)
 _AIR_SD = const(49)
@@ -36,11 +36,12 @@ _AIR_SLOPE = const(65)
 _CURVE_PRESSURE = const(66)
 _CURVE_BEND = const(67)
 _CURVE_SLOPE = const(68)
-_ROW_WORDS = const(69)
+_ROW_WORDS = const(70)
 _KNOT_HEIGHT = const(0)
 _KNOT_PRESSURE = const(2)
 _KNOT_SLOPE = const(3)
-_KNOT_WORDS = const(5)
+_KNOT_RISE = const(5)
+_KNOT_WORDS = const(6)
 _BUBBLE_COUNT = const(0)
 _TICK = const(19)
 _SECOND = const(22)
@@ -77,7 +78,7 @@ def compare(row: ptr32, board: ptr32, bubble: int) -> int:
     pressure = row[_QUIET_PRESSURE]
 
     # Air per height at this pressure, and how far the height may be off.
-    air_slope = (pressure + atmosphere >> 8) * knot[_KNOT_SLOPE] // 1000 + 1
+    air_slope = ((pressure + atmosphere >> 4) * knot[_KNOT_SLOPE] >> 14) + 1
     row[_AIR_SLOPE] = air_slope
     reach = (row[_AIR_SD] << 6) // air_slope
     if reach < _NEAR_UM:
@@ -110,8 +111,7 @@ def compare(row: ptr32, board: ptr32, bubble: int) -> int:
                 segment += 4 * _KNOT_WORDS
             knot = ptr32(uint(curves) + segment)
             off = h - knot[_KNOT_HEIGHT]
-        p = knot[_KNOT_WORDS + _KNOT_PRESSURE] - knot[_KNOT_PRESSURE]
-        p = knot[_KNOT_PRESSURE] + off * p // (knot[_KNOT_WORDS + _KNOT_HEIGHT] - knot[_KNOT_HEIGHT])
+        p = knot[_KNOT_PRESSURE] + (off * knot[_KNOT_RISE] >> 12)
         if place == 0:
             here = p
         elif place == 1:

@@ -4,7 +4,8 @@ All of it is one array of 32-bit integers (`Bubbles`), a row for every bubble. T
 on the device: offsets below 32 are cheap to reach there, so that is where a row has what every tick needs. Other device
 files repeat these names in regions that tools/generate/constants.py writes.
 
-Air is in µJ: 1 µJ = 1 kPa mm³ of pV content in bubble and line, isothermal.
+Air is in µJ: 1 µJ = 1 kPa mm³ of pV content in bubble and line, isothermal. Volumes are in units of 1000/65536 mm³, so that
+volume times pressure in 16 Pa is air times 4096: no division.
 """
 
 from bubble_protocol.mpy_compat import const
@@ -22,38 +23,38 @@ CURVE_SD = const(8)  # of the curve and of the rubber's memory, share *65536
 LEAK_RATE = const(9)  # air lost, µJ/s per kPa, *16
 PRESSURE = const(10)  # measured, Pa gauge
 SUSPECT = const(11)  # whether the last reading was one that may become a fault
-QUIESCENT = const(12)  # whether nothing is under way
+QUIESCENT = const(12)  # 1 where nothing is under way, HELD where its valve stays open for a period more
 READINGS = const(13)  # of a quiet line, in the sum
 READINGS_SUM = const(14)  # Pa
 SETTLING_US = const(15)  # from the start of the period until the line is quiet
 AIR = const(16)  # at the start of this period, µJ
-AIR_METERED = const(17)  # what the valves have brought in the period that ended, µJ
-AIR_IN_FLIGHT = const(18)  # what the period now playing brings, µJ
-FILL_FLOW = const(19)  # at this moment's pressures, were the valve open, µJ/ms, *16
-VENT_FLOW = const(20)
-FILL_US = const(21)  # energised in the period now playing
-VENT_US = const(22)
-FILL_OPEN_US = const(23)  # how long the valve is open in the period now playing
-VENT_OPEN_US = const(24)
-FILL_FULL = const(25)  # whether it is still open when that ends
-VENT_FULL = const(26)
-DUE = const(27)  # whether it is measured and decided upon in this tick
-STATUS = const(28)
-FAULTS = const(29)
-TARGET = const(30)  # asked, µm
-HEIGHT = const(31)  # the estimate, in 1/16 µm
-HEIGHT_SEGMENT = const(32)  # where its segment of the curve begins, bytes
+AIR_IN_FLIGHT = const(17)  # what the period now playing brings, µJ
+FILL_FLOW = const(18)  # at this moment's pressures, were the valve open, µJ/ms, *16; 0 where that has not been asked
+VENT_FLOW = const(19)
+FILL_US = const(20)  # energised in the period now playing
+VENT_US = const(21)
+FILL_FULL = const(22)  # whether it is still open when that ends
+VENT_FULL = const(23)
+DUE = const(24)  # whether it is measured and decided upon in this tick
+STATUS = const(25)
+HEIGHT = const(26)  # the estimate, in 1/16 µm
+HEIGHT_SEGMENT = const(27)  # where its segment of the curve begins, bytes
+SETPOINT_AIR = const(28)  # µJ
+PREVIOUS_SETPOINT_AIR = const(29)  # last tick's, µJ
+RAMPING = const(30)  # whether the setpoint is not at its target yet
+FILL_OPEN_US = const(31)  # how long the valve is open in the period now playing
+VENT_OPEN_US = const(32)
 SETPOINT = const(33)  # in 1/16 µm
-SETPOINT_AIR = const(34)  # µJ
-PREVIOUS_SETPOINT_AIR = const(35)  # last tick's, µJ
-SETPOINT_SEGMENT = const(36)
-SETPOINT_VOLUME = const(37)  # of bubble and line, 1/64 mm³
-SETPOINT_PRESSURE = const(38)  # by the curve, Pa
-SETPOINT_SLOPE = const(39)  # volume per height there, 1/64 mm³/µm, *256
-RAMP_START = const(40)  # where the ramp to the target began, µm
-RAMPING = const(41)  # whether the setpoint is not at its target yet
-FILL_RUN_US = const(42)  # how long the fill valve has been open at a stretch
-ERROR = const(43)  # last tick's, µJ
+ERROR = const(34)  # last tick's, µJ
+AIR_METERED = const(35)  # what the valves have brought in the period that ended, µJ
+FAULTS = const(36)
+TARGET = const(37)  # asked, µm
+SETPOINT_SEGMENT = const(38)
+SETPOINT_VOLUME = const(39)  # of bubble and line
+SETPOINT_PRESSURE = const(40)  # by the curve, Pa
+SETPOINT_SLOPE = const(41)  # volume per µm there, *256
+RAMP_START = const(42)  # where the ramp to the target began, µm
+FILL_RUN_US = const(43)  # how long the fill valve has been open at a stretch
 FIRST_SEGMENT = const(44)  # of its curve, bytes
 LAST_SEGMENT = const(45)
 OVERPRESSURE_TICKS = const(46)  # in a row above the pressure limit
@@ -64,7 +65,7 @@ AIR_SD = const(49)  # of the air, µJ
 CURVE_ERROR = const(50)  # share by which the pressure is above the curve's, *65536
 CURVE_ERROR_SD = const(51)  # *65536
 CORRELATION = const(52)  # of the two errors, *4096
-HEIGHT_SD = const(53)  # µm
+HEIGHT_SD = const(53)  # µm, as `deviations` last found it
 PRESSURE_RATIO = const(54)  # share by which the quiet line's pressure is above the curve's, averaged, *4096
 DWELL_HEIGHT = const(55)  # where the bubble stood when the curve was first asked in this dwell, µm
 DWELL_SLOPE = const(56)  # pressure per height there, Pa/µm, *1024; 0: not yet known
@@ -80,15 +81,17 @@ AIR_SLOPE = const(65)  # air per height at this pressure, µJ/µm, *64
 CURVE_PRESSURE = const(66)  # of the curve at this height, Pa
 CURVE_BEND = const(67)  # how much less it is than on the secant, Pa
 CURVE_SLOPE = const(68)  # of the secant, Pa/µm, *1024
-ROW_WORDS = const(69)
+READINGS_BITS = const(69)  # so many readings make its next mean, as a power of two
+ROW_WORDS = const(70)
 
 # A knot of a curve, see `curve`.
 KNOT_HEIGHT = const(0)  # 1/16 µm
-KNOT_VOLUME = const(1)  # of bubble and line, 1/64 mm³
+KNOT_VOLUME = const(1)  # of bubble and line
 KNOT_PRESSURE = const(2)  # Pa
-KNOT_SLOPE = const(3)  # volume per height from here on, 1/64 mm³/µm, *256
+KNOT_SLOPE = const(3)  # volume per µm from here on, *256
 KNOT_RECIPROCAL = const(4)  # of the slope, 2^28/slope
-KNOT_WORDS = const(5)
+KNOT_RISE = const(5)  # pressure per 1/16 µm from here on, Pa *4096
+KNOT_WORDS = const(6)
 
 # The board's numbers.
 BUBBLE_COUNT = const(0)
@@ -129,10 +132,12 @@ ATMOSPHERE = const(101325)  # Pa
 READINGS_MIN = const(2)  # in a row that make a fault: one alone is noise
 
 # The law's own numbers, the same for all boards.
-READINGS_MEAN = const(8)  # of a quiet line, which make a mean
+READINGS_BITS_FIRST = const(3)  # of a line that has become quiet, eight readings make the first mean,
+READINGS_BITS_NEXT = const(5)  # and 32 each that follows
 AIR_SD_MAX = const(60000)  # µJ
 EMPTY_PA = const(1000)  # a line that has no more for a while is empty: the best reference there is
 EMPTY_US = const(15000)
+HELD = const(2)
 RESTART = const(256)  # of what `estimate` returns
 DOSE_MAX = const(50000)  # µJ, more than any period brings
 ROOT_END = const(8191)  # the last place in a table of roots, *128

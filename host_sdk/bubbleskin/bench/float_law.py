@@ -14,7 +14,8 @@ from bubble_firmware.control.state_layout import (
     EMPTY_US,
     FOLLOW,
     KEEP_CLOSED,
-    READINGS_MEAN,
+    READINGS_BITS_FIRST,
+    READINGS_BITS_NEXT,
 )
 
 
@@ -66,9 +67,15 @@ class Valve:
         self.energised_us = self.open_us = 0.0
         self.full = False
 
-    def meter(self, pressure, supply):
-        """What it has brought in the period that ended, and what it brings in the one that begins, both signed."""
+    def meter(self, pressure, supply, asked):
+        """What it has brought in the period that ended, and what it brings in the one that begins, both signed.
+
+        Where it does nothing and its flow is not asked for, none is known.
+        """
         board = self.board
+        if not (asked or self.full or self.energised_us or self.open_us):
+            self.flow = 0.0
+            return 0.0, 0.0
         tick = board.TICK_US
         before = self.flow
         was_full = self.full
@@ -108,8 +115,9 @@ class Bubble:
         self.vent = Valve(board, -1)
         self.pressure = 0.0
         self.due = True
-        self.quiescent = False
+        self.quiescent = self.held = False
         self.readings = 0
+        self.readings_mean = 1 << READINGS_BITS_FIRST
         self.readings_sum = 0.0
         self.settling_us = 0.0
         self.air = ATMOSPHERE * curve.volume[0] / 1000
@@ -133,7 +141,7 @@ class Bubble:
         """Begin the way from where it is to `height`."""
         self.ramp_start = self.height
         self.target = float(height)
-        self.quiescent = False
+        self.quiescent = self.held = False
         self.ramping = True
 
     def estimate(self, count, supply, same_mode, served):
@@ -148,13 +156,20 @@ class Bubble:
             self.due = self._is_due(served)
             if self.due:
                 chosen = not self.vent.full
-                pressure = self.readings_sum / READINGS_MEAN
+                pressure = self.readings_sum / self.readings_mean
                 self.quiet_pressure = pressure
                 self.readings = 0
                 self.readings_sum = 0.0
+                self.readings_mean = 1 << READINGS_BITS_NEXT
         else:
             self.readings = 0
             self.readings_sum = 0.0
+            self.readings_mean = 1 << READINGS_BITS_FIRST
+            if self.held and same_mode:
+                self.due = False
+                valve = self.fill if self.fill.energised_us else self.vent
+                valve.open_us += board.TICK_US
+            self.held = False
         if self.due:
             self._take_air(supply, pressure, chosen)
         return chosen
@@ -162,7 +177,7 @@ class Bubble:
     def _is_due(self, served):
         if self.settling_us > 0:
             self.settling_us -= self.board.TICK_US
-        elif self.readings < READINGS_MEAN:
+        elif self.readings < self.readings_mean:
             self.readings += 1
             self.readings_sum += self.pressure
         else:
@@ -172,8 +187,9 @@ class Bubble:
     def _take_air(self, supply, pressure, chosen):
         board = self.board
         curve = self.curve
-        brought, coming = self.fill.meter(self.pressure, supply)
-        let_out, leaving = self.vent.meter(self.pressure, supply)
+        missing = self.setpoint_air - self.air
+        brought, coming = self.fill.meter(self.pressure, supply, missing > 0)
+        let_out, leaving = self.vent.meter(self.pressure, supply, missing < 0)
         for valve, moved in ((self.fill, brought), (self.vent, -let_out)):
             if moved:
                 self.air_sd += moved * board.FLOW_SD / 65536 + (0.0 if valve.energised_us else 10.0)
@@ -307,11 +323,17 @@ class Bubble:
             error += ahead
             ahead = 0.0
         width = 0.0
+        unasked = False
         if ahead or abs(error) > (self.pressure + ATMOSPHERE) * self.setpoint_slope * board.DEADBAND_UM / 1000:
             want = ahead + (error * board.GAIN_P + (error - self.error) * board.GAIN_D) / 256
             valve, before = (self.fill, filled) if want > 0 else (self.vent, vented)
-            width = valve.energised_us = self._width(abs(want), valve.flow, before == board.TICK_US)
-        self.quiescent = not (filled or vented or self.air_in_flight or self.ramping or width)
+            opened = before == board.TICK_US
+            if valve.flow:
+                width = valve.energised_us = self._width(abs(want), valve.flow, opened)
+                self.held = opened and min(abs(want), DOSE_MAX) * 1000 / valve.flow > 3 * board.TICK_US
+            else:
+                unasked = True
+        self.quiescent = not (filled or vented or self.air_in_flight or self.ramping or width or unasked)
         self.error = error
 
     def _width(self, size, flow, opened):

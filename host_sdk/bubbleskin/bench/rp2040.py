@@ -140,7 +140,7 @@ def curves(board: str) -> list[list[tuple[float, int, int]]]:
         knots = range(first, last + 2 * layout.KNOT_WORDS, layout.KNOT_WORDS)
         places = (layout.KNOT_HEIGHT, layout.KNOT_VOLUME, layout.KNOT_PRESSURE)
         heights, volumes, pressures = ([bubbles.curves[knot + place] for knot in knots] for place in places)
-        found.append([(h / 16, v / 64, p) for h, v, p in zip(heights, volumes, pressures, strict=True)])
+        found.append([(h / 16, v * 1000 / 65536, p) for h, v, p in zip(heights, volumes, pressures, strict=True)])
     return found
 
 
