@@ -60,7 +60,7 @@ class World:
         self.alone = not contact
         self.matched = not spread
         self.host = host or (lambda firmware: None)
-        self.failing = set()
+        self.failing = {}  # value by (failure, bubble)
         self.ill = set()  # bubbles that ever were: a sensor that was off leaves wrong estimates
         self.telling = True
         self.pressed = False
@@ -68,6 +68,7 @@ class World:
         self.fill_s = np.zeros(self.bubbles)
         self.isolated_s = np.zeros(self.bubbles)
         self.supply_is_ill = self.supply_lies = self.fill_sticks = False
+        self.lost = np.zeros(self.bubbles, bool)
         self.high_s = 0.0
         self.cut_power(first=True)
 
@@ -106,13 +107,14 @@ class World:
     # What happens to the board.
 
     def inject(self, failure, bubble, value):
-        self.failing.add((failure, bubble))
+        self.failing[failure, bubble] = value
+        self.lost[bubble] |= self.is_lost(bubble)
         self.ill.add(bubble)
         self.fill_sticks |= failure == "fill_stuck" and value > 0.0
         self.board.inject(failure, bubble, value)
 
     def inject_supply(self, failure, value):
-        self.failing.add((failure, 0))
+        self.failing[failure, 0] = value
         self.supply_is_ill = True
         self.supply_lies |= failure in SUBTLE
         self.board.inject(failure, 0, value)
@@ -168,13 +170,14 @@ class World:
         board, plant = self.board, self.board.plant
         decided = board.pulses
         told = tuple(board.firmware.app.bubbles.faults(bubble) for bubble in range(self.bubbles))
+        pressure_pa = np.where(self.lost, 0.0, plant.pressure_pa)
         self.require(
-            plant.pressure_pa.max() <= PRESSURE_LIMIT_PA + PRESSURE_MARGIN_PA,
+            pressure_pa.max() <= PRESSURE_LIMIT_PA + PRESSURE_MARGIN_PA,
             "pressure",
-            f"{plant.pressure_pa.max() / 1e3:.1f} kPa in bubble {int(plant.pressure_pa.argmax())}",
+            f"{pressure_pa.max() / 1e3:.1f} kPa in bubble {int(pressure_pa.argmax())}",
         )
         if self.alone and self.matched:
-            self.judge_height(plant.height_mm)
+            self.judge_height(np.where(self.lost, 0.0, plant.height_mm))
         most = RELIEF_LIMIT_PA if self.supply_lies else RESERVOIR_LIMIT_PA
         self.require(plant.supply_pa <= most, "reservoir", f"{plant.supply_pa / 1e3:.1f} kPa")
         vented = (decided[:, 0] == 0.0) & (decided[:, 1] >= board.tick_s)
@@ -187,6 +190,13 @@ class World:
             self.fill_s.max() <= FILL_AT_MOST_S + 2 * board.tick_s, "on-time", f"open for {self.fill_s.max():.2f} s"
         )
         self.judge_faults(told, vented)
+
+    def is_lost(self, bubble):
+        """Whether air comes in, none goes out, and the sensor does not see it: three parts failed, and nothing is promised of it."""
+        failing = self.failing
+        comes_in = failing.get(("fill_stuck", bubble), 0.0) > 0.0
+        stays_in = failing.get(("vent_stuck", bubble), 0.0) < 0.0
+        return comes_in and stays_in and (("sensor_stuck", bubble) in failing or ("sensor_absent", bubble) in failing)
 
     def judge_height(self, height_mm):
         """True heights of bubbles that nobody lifts, on rubber as the tables have it."""
