@@ -197,14 +197,14 @@ def test_held_by_stop_it_vents_when_the_host_is_silent(rig7):
 def test_settings_are_kept_within_the_boards_limits(rig7):
     read = rig7.ask("SETTING_READ").columns
     for number, low, high in zip(read["setting"].tolist(), read["low"].tolist(), read["high"].tolist(), strict=True):
-        for value in (low - 1, high + 1):
+        for value in (*range(max(low - 1, 0), low), high + 1):
             answer = rig7.refused("SETTING_WRITE", (), [(DEADMAN_HOLD, 60), (number, value)])
             assert answer == (errors.OUT_OF_RANGE, 1, 1, value, low, high)
-    assert rig7.refused("SETTING_WRITE", (), [(0, 100), (3, 1)]) == (errors.NO_SETTING, 0, 1, 3, 0, 2)
+    assert rig7.refused("SETTING_WRITE", (), [(0, 100), (5, 1)]) == (errors.NO_SETTING, 0, 1, 5, 0, 4)
     assert rig7.refused("SETTING_WRITE", (), [(0, 3000)]) == (errors.OUT_OF_RANGE, 1, 255, 1000, 3000, 60000)
     assert (rig7.ask("SETTING_READ").columns["value"] == read["value"]).all(), "all or none"
     rig7.ask("SETTING_WRITE", (), [(1, 5000), (0, 3000)])
-    assert rig7.ask("SETTING_READ").columns["value"].tolist() == [3000, 5000, 3600]
+    assert rig7.ask("SETTING_READ").columns["value"].tolist() == [3000, 5000, 3600, 101325, 250]
     assert rig7.app.settings.version == 1
     hold(rig7)
     rig7.ask("PING", (0,))

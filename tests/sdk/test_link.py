@@ -90,10 +90,10 @@ def test_nothing_gets_through_and_the_call_ends_in_time(tapped):
         skin.state()
     assert tap.now() - begin == pytest.approx(1.0, abs=0.02)
     sent = tap.understood(tap.sent[before:])
-    requests = [request for request in sent if request.id == messages.STATE]
+    requests = [request for request in sent if request.id == messages.ESTIMATE]
     assert len({request.sequence for request in requests}) == 1, "a resent request keeps its number"
     assert 4 <= len(requests) <= 8, "30, 60, 120 ms … apart"
-    assert {request.id for request in sent} == {messages.STATE, messages.HELLO}, "is it still the same device?"
+    assert {request.id for request in sent} == {messages.ESTIMATE, messages.HELLO}, "is it still the same device?"
 
 
 def test_replies_that_come_twice_answer_once(tapped):

@@ -26,11 +26,16 @@ def heights_after(order, url="sim://wristband7"):
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_the_papers_three_heights_through_firmware_and_valves(seed):
-    centre = {order: heights_after(order, f"sim://wristband7?seed={seed}")[0][0] for order in ORDERS}
+    shapes = {order: heights_after(order, f"sim://wristband7?seed={seed}")[0] for order in ORDERS}
+    centre = {order: shape[0] for order, shape in shapes.items()}
     assert centre["alone"] == pytest.approx(12.0, abs=0.1)
     assert centre["ring first"] == pytest.approx(centre["alone"], abs=0.4)
-    assert centre["together"] == pytest.approx(centre["alone"], abs=0.4)
     assert centre["centre first"] == pytest.approx(14.0, abs=0.2)
+    # All at once, there is no room for all: the centre or some of the ring are lifted, and which is chance.
+    together = shapes["together"]
+    lifted = together > (12 + 14) / 2
+    assert 1 <= lifted.sum() <= 3
+    assert together == pytest.approx(np.where(lifted, 14.0, 12.0), abs=0.4)
 
 
 @pytest.mark.parametrize("order", ["alone", "centre first"])

@@ -185,7 +185,7 @@ def dose(row: ptr32, board: ptr32, pulses: ptr16, mode: int):
                         vent = width
                 if energised | in_flight | row[_RAMPING] | fill | vent | unasked == 0:
                     row[_QUIESCENT] = 1
-                elif far:
+                elif far and row[_FILL_RUN_US] + tick < board[_FILL_MAX_US]:
                     row[_QUIESCENT] = _HELD
                 row[_ERROR] = error
             row[_FILL_US] = fill

@@ -207,17 +207,15 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 if active or missing > 0:
                     before = state[_FILL_FLOW]
                     trim = ptr32(uint(row) + 12 * valve)  # of this valve
-                    at = row[_PRESSURE]
-                    if valve == 0:
-                        if was_open == 0:
-                            at += board[_TUBE_PA] * before >> 4  # which the tube will lose once air flows
-                        at = (supply - at) * supply_reciprocal >> 16
-                        scale = supply_scale
-                    else:
-                        if was_open == 0:
-                            at -= board[_TUBE_PA] * before >> 4
-                        at >>= 3
+                    at = 0 if was_open else board[_TUBE_PA] * before >> 4  # which the tube will lose once air flows
+                    if valve:
+                        sign = 0 - 1
+                        at = row[_PRESSURE] - at >> 3
                         scale = 1 << 14
+                    else:
+                        sign = 1
+                        at = (supply - row[_PRESSURE] - at) * supply_reciprocal >> 16
+                        scale = supply_scale
                     if at >> 13:
                         at = _ROOT_END if at > 0 else 0
                     part = at & 127
@@ -232,7 +230,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                         if open_us:
                             moved = ((before + flow) * open_us >> 13) * 16777 >> 16
                             row[_AIR_SD] = row[_AIR_SD] + (moved * row[_FLOW_SD] >> 16) + (10 if energised == 0 else 0)
-                            metered += 0 - moved if valve else moved
+                            metered += sign * moved
                             open_us = 0
                         if energised:
                             open_us = energised if was_open else energised - trim[_FILL_OPENS_US]
@@ -243,7 +241,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                         state[_FILL_FULL] = 1 if energised == tick else 0
                         if open_us:
                             coming = (flow * open_us >> 12) * 16777 >> 16
-                            in_flight += 0 - coming if valve else coming
+                            in_flight += sign * coming
                 state[_FILL_FLOW] = flow
                 missing = 0 - missing
                 valve += 1

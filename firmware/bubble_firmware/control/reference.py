@@ -36,6 +36,7 @@ _AIR_SLOPE = const(65)
 _CURVE_PRESSURE = const(66)
 _CURVE_BEND = const(67)
 _CURVE_SLOPE = const(68)
+_READINGS_BITS = const(69)
 _ROW_WORDS = const(70)
 _KNOT_HEIGHT = const(0)
 _KNOT_PRESSURE = const(2)
@@ -47,6 +48,7 @@ _TICK = const(19)
 _SECOND = const(22)
 _ATMOSPHERE_PA = const(23)
 _ROWS = const(157)
+_READINGS_BITS_FIRST = const(3)
 _AIR_SD_MAX = const(60000)
 # [end of constants]
 
@@ -236,14 +238,18 @@ def correct(row: ptr32, board: ptr32, bubble: int):
     if v < 1024:
         v = 1024
     r = row[_QUIET_PRESSURE] - here - (here * (error >> 2) >> 14)
+    # Beyond four standard deviations both are worse than thought. The next mean is asked then, and where a step is not enough.
+    doubted = 1 if (r >> 2) * (r >> 2) > v else 0
+    if doubted or r > _INNOVATION_MAX or r < 0 - _INNOVATION_MAX:
+        row[_REFERENCE_TICK] = board[_TICK] - board[_SECOND]
+        row[_READINGS_BITS] = _READINGS_BITS_FIRST
     if r > _INNOVATION_MAX:
         r = _INNOVATION_MAX
     if r < 0 - _INNOVATION_MAX:
         r = 0 - _INNOVATION_MAX
-    if r * r >> 4 > v:  # beyond four standard deviations: both are worse than thought, and the next mean is asked
+    if doubted:
         row[_AIR_SD] = air_sd * 2 if air_sd < _AIR_SD_MAX >> 1 else _AIR_SD_MAX
         row[_CURVE_ERROR_SD] = sd * 2 if sd < _CURVE_SD_MAX >> 1 else _CURVE_SD_MAX
-        row[_REFERENCE_TICK] = board[_TICK] - board[_SECOND]
         row[_DWELL_SLOPE] = 0
     else:
         gain = air_sd * u // (v >> 8)

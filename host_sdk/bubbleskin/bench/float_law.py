@@ -243,11 +243,15 @@ class Bubble:
         u = a + correlation * c
         w = c + correlation * a
         v = max(a * u + c * w + noise * noise, 1024.0)
-        r = min(max(pressure - here * (1 + error), -5000.0), 5000.0)
-        if r * r > 16 * v:
+        r = pressure - here * (1 + error)
+        doubted = r * r > 16 * v
+        if doubted or abs(r) > 5000:
+            self.reference_tick = tick - second
+            self.readings_mean = 1 << READINGS_BITS_FIRST
+        r = min(max(r, -5000.0), 5000.0)
+        if doubted:
             self.air_sd = min(2 * self.air_sd, 60000.0)
             self.curve_error_sd = min(2 * sd, 0.4)
-            self.reference_tick = tick - second
             self.dwell_slope = 0.0
             return
         self.air = max(self.air + self.air_sd * u * r / v, 0.0)
