@@ -225,7 +225,7 @@ class Skin:
         run_sync(self._skin.acknowledge(fault))
 
     def settings(self) -> dict[str, Setting]:
-        """What can be set: deadman_hold, deadman_vent (s), budget_kpa_s; values in use and this wristband's limits."""
+        """What can be set: deadman_hold, deadman_vent (s), budget_kpa_s, atmosphere_kpa, rezero_mm; values in use and limits."""
         return run_sync(self._skin.settings())
 
     def configure(self, **wanted: float) -> None:

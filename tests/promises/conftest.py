@@ -192,7 +192,7 @@ class World:
         self.judge_faults(told, vented)
 
     def is_lost(self, bubble):
-        """Whether air comes in, none goes out, and the sensor does not see it: three parts failed, and nothing is promised of it."""
+        """Whether air comes in, none goes out, and the sensor does not see it: with three parts failed nothing is promised."""
         failing = self.failing
         comes_in = failing.get(("fill_stuck", bubble), 0.0) > 0.0
         stays_in = failing.get(("vent_stuck", bubble), 0.0) < 0.0

@@ -33,15 +33,19 @@ _VENT_FLOW = const(19)
 _FILL_US = const(20)
 _VENT_US = const(21)
 _STATUS = const(25)
+_HEIGHT_SEGMENT = const(27)
 _AIR_METERED = const(35)
 _FAULTS = const(36)
 _LOST_TICKS = const(47)
 _ROW_WORDS = const(70)
+_KNOT_PRESSURE = const(2)
+_KNOT_WORDS = const(6)
 _BUBBLE_COUNT = const(0)
 _TICK_US = const(1)
 _TUBE_PA = const(9)
 _RAMP_DONE = const(16)
 _RAMP_TICKS = const(17)
+_ROWS = const(157)
 _READINGS_MIN = const(2)
 _NEW_FAULT = const(1)
 _MOVING_BUBBLE = const(2)
@@ -117,6 +121,7 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
     """Sensor, budget and vented lines of all bubbles; whether one moves, has pressure or is overfilled."""
     found = _MOVING_BUBBLE if board[_RAMP_DONE] < board[_RAMP_TICKS] else 0
     n = board[_BUBBLE_COUNT]
+    curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
     while n > 0:
         pressure = row[_PRESSURE]
         faults = row[_FAULTS]
@@ -168,13 +173,16 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
                 if pressure < _VENTED_PA and faults == 0:
                     watch[_INFLOW] = 0
             elif row[_LOST_TICKS] == 0:
-                watch[_STALL_TICKS] = watch[_STALL_TICKS] + 1
-                if pressure > watch[_STALL_PA] + _STALL_FALL_PA:
-                    watch[_INFLOW] = 1
-                if watch[_STALL_TICKS] >= limits[_STALL_MAX]:
-                    faults |= _VALVE_STUCK
-                    if watch[_INFLOW] and pressure > _OVERFILLED_PA:
-                        found |= _OVERFILLED_BUBBLE
+                # On its plateau a soft bubble empties without losing pressure. One that had the air that is left would have less.
+                knot = ptr32(uint(curves) + row[_HEIGHT_SEGMENT])
+                if pressure > knot[_KNOT_PRESSURE] and pressure > knot[_KNOT_WORDS + _KNOT_PRESSURE]:
+                    watch[_STALL_TICKS] = watch[_STALL_TICKS] + 1
+                    if pressure > watch[_STALL_PA] + _STALL_FALL_PA:
+                        watch[_INFLOW] = 1
+                    if watch[_STALL_TICKS] >= limits[_STALL_MAX]:
+                        faults |= _VALVE_STUCK
+                        if watch[_INFLOW] and pressure > _OVERFILLED_PA:
+                            found |= _OVERFILLED_BUBBLE
 
             # One that loses pressure through its vent and is not empty in time gets air. Whether a high one that loses none
             # gets some, or only keeps its own, cannot be told: the supply is shut down for it, too.

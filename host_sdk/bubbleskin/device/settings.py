@@ -15,6 +15,8 @@ NAMES = {
     "deadman_hold": ("deadman_hold_ms", 1e-3),
     "deadman_vent": ("deadman_vent_ms", 1e-3),
     "budget_kpa_s": ("budget_kpa_s", 1),
+    "atmosphere_kpa": ("atmosphere_pa", 1e-3),
+    "rezero_mm": ("rezero_um", 1e-3),
 }
 """What `configure` takes: the setting on the wire, and its unit in ours."""
 
