@@ -85,6 +85,7 @@ def test_air_of_another_pressure_is_a_setting(kpa):
             assert np.abs(hold(skin, shape)[0]).max() > 0.15
 
 
+@pytest.mark.slow
 def test_a_leak_that_is_known_is_made_up_for():
     shape = np.linspace(7.0, 12.0, 7)  # lower, so much is a fault
     with connect("&leak=0.01") as skin:
@@ -117,6 +118,7 @@ def test_what_empties_through_a_plateau_has_no_fault(sheet):
             assert skin.simulated.alone_mm.max() < 5.3
 
 
+@pytest.mark.slow
 def test_a_bubble_that_has_become_unsure_is_emptied_before_it_goes_elsewhere():
     rng = np.random.default_rng(3)
     with connect("&sheet=stiff50", {"rezero_mm": 0.15}, flow_sd=np.full(7, 1200)) as skin:
