@@ -10,7 +10,7 @@ import tty
 
 import pytest
 
-from bubbleskin.cli.main import main
+from bubbleskin.cli.command import main
 
 SIM = ["--device", "sim://wristband7"]
 

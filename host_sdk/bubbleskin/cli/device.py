@@ -14,7 +14,7 @@ from rich.table import Table
 from bubbleskin import boards
 from bubbleskin.checks import number
 from bubbleskin.cli.options import as_json, device, gathered
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
 from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput

@@ -13,7 +13,7 @@ import click
 
 from bubbleskin import boards
 from bubbleskin.cli.options import device, gathered
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 from bubbleskin.errors import InvalidInput
 
 if TYPE_CHECKING:  # physics and plot load scipy and matplotlib, so a verb imports them when it runs

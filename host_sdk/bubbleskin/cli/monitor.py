@@ -11,7 +11,7 @@ from rich.live import Live
 
 from bubbleskin.checks import above_zero
 from bubbleskin.cli.options import as_json, device
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 from bubbleskin.telemetry.recording import Table
 
 _SHOWN = ("height", "pressure", "target", "status", "faults")

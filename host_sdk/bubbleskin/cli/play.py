@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from bubbleskin.cli.options import as_json, device
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.library import LIBRARY

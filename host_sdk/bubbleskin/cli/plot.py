@@ -13,7 +13,7 @@ from bubbleskin import boards
 from bubbleskin.cli.membrane import DATA, balloon, draw_fit, fit_file, fit_options, material_options, picture_option
 from bubbleskin.cli.options import Board
 from bubbleskin.cli.play import load
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 from bubbleskin.sequence.library import LIBRARY
 
 

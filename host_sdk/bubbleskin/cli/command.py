@@ -102,6 +102,7 @@ def _logging() -> Iterator[None]:
 
 
 def _end(sentence: str, status: int) -> None:
+    exec("")  # an interrupted `exec` of any library would make Python end by SIGINT after all; the next one undoes it
     click.echo(" ".join(sentence.split()), err=True)
     sys.exit(status)
 
