@@ -10,6 +10,7 @@ import tty
 
 import pytest
 
+import bubbleskin as bs
 from bubbleskin.cli.command import main
 
 SIM = ["--device", "sim://wristband7"]
@@ -172,6 +173,18 @@ def test_tables_go_to_the_wristband_and_come_back(run, tmp_path):
     wrong = run("table", "--board", "wristband19", "--bubbles", "19", "-o", mixed, "--upload", *SIM)
     assert wrong[0] == 2
     assert "this is a wristband7" in wrong[2]
+
+
+def test_tables_that_look_wrong_are_uploaded_anyway(run, tmp_path):
+    odd = str(tmp_path / "odd.toml")
+    straight = bs.Table([5000, 14000], [0, 36000])
+    bs.Calibration("wristband7", (straight,) * 7).save(odd)
+    status, _, said = run("table", "--show", odd, "--upload", *SIM)
+    assert (status, said.count("\n")) == (2, 1)
+    assert "not one of rubber" in said
+    assert "--anyway" in said
+    assert run("table", "--show", odd, "--upload", "--anyway", *SIM)[0] == 0
+    assert_one_sentence(run("table", "--show", odd, "--anyway", *SIM), 2, "--anyway goes with --upload")
 
 
 # Sequences.

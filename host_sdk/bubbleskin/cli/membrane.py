@@ -46,6 +46,7 @@ class Use(NamedTuple):
     output: Path | None
     upload: bool
     save: bool
+    anyway: bool
 
 
 class Sizes(NamedTuple):
@@ -150,6 +151,9 @@ def fit(data: Path, form: TableForm, output: Path | None, picture: Path | None, 
 @click.option("-o", "--output", type=DATA, help="Write a calibration file.")
 @click.option("--upload", is_flag=True, help="Let the wristband use these tables, until it restarts.")
 @click.option("--save", is_flag=True, help="With --upload: for good. The wristband must be vented.")
+@click.option(
+    "--anyway", is_flag=True, help="With --upload: tables that are none of rubber, or contradict each other, too."
+)
 @device
 @json_option
 @gathered(source=Source, use=Use, form=TableForm)
@@ -164,6 +168,8 @@ def table(
 
     if use.save and not use.upload:
         raise InvalidInput("--save goes with --upload: it keeps the tables that are uploaded.")
+    if use.anyway and not use.upload:
+        raise InvalidInput("--anyway goes with --upload: it uploads what looks wrong.")
     calibration = _find_tables(source, form, device, **options)
     click.echo(json.dumps(calibration.as_dict(), indent=2) if as_json else calibration.report())
     if use.output:
@@ -171,7 +177,7 @@ def table(
         click.echo(f"wrote {use.output}", err=True)
     if use.upload:
         with connect(device) as skin:
-            skin.upload_tables(calibration, use.save)
+            skin.upload_tables(calibration, use.save, anyway=use.anyway)
         until = "from now on" if use.save else "until it restarts"
         click.echo(f"{calibration.board} uses these tables, CRC {calibration.crc32:08x}, {until}", err=True)
     if compare:

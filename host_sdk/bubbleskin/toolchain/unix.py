@@ -107,8 +107,8 @@ def prove(interpreter: Path) -> str:
     if sums != ["-9", "True", "True"]:
         raise BubbleskinError(
             f"{interpreter} is MicroPython {version}, but not a 32-bit build: its small integers and viper's "
-            "ptr32 differ from the RP2040's. Build it with MICROPY_FORCE_32BIT=1, or unset MICROPYTHON and "
-            "run `python tools/build_micropython.py`."
+            "ptr32 differ from the RP2040's. Build it with MICROPY_FORCE_32BIT=1, or unset MICROPYTHON: "
+            "then one is built where it is needed first."
         )
     return version
 
