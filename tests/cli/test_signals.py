@@ -107,4 +107,4 @@ def test_ctrl_c_within_the_first_second(verb, seconds, tmp_path):
 def test_nothing_that_takes_long_is_imported_before_ctrl_c_is_understood():
     code = "import sys; before = set(sys.modules); import bubbleskin.cli; print(*set(sys.modules) - before)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split()) == {"bubbleskin", "bubbleskin.cli", "bubbleskin.cli.entry"}
+    assert set(done.stdout.split()) - {"types"} == {"bubbleskin", "bubbleskin.cli", "bubbleskin.cli.entry"}

@@ -91,7 +91,8 @@ def test_a_timeout_that_cannot_be_meant(port, timeout):
 def test_a_micropython_that_is_not_there(monkeypatch, tmp_path):
     monkeypatch.delenv("MICROPYTHON", raising=False)
     monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path))
-    fails(bs.BubbleskinError, "has not been built", "make micropython", act=connecting("micropython://wristband7"))
+    monkeypatch.setenv("PATH", str(tmp_path))  # nor anything that could build one
+    fails(bs.BubbleskinError, "cannot be built here", "Set MICROPYTHON=", act=connecting("micropython://wristband7"))
 
 
 @pytest.mark.parametrize(

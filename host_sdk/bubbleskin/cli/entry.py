@@ -1,10 +1,7 @@
 """Where the command begins, and what Ctrl-C means from then on: importing the rest takes most of a second."""
 
 import os
-
-TYPE_CHECKING = False  # as of `typing`, which is not waited for
-if TYPE_CHECKING:
-    from types import FrameType
+from types import FrameType
 
 _AGAIN = 0.05  # seconds after which it is looked again whether that is over
 
@@ -50,7 +47,7 @@ class _CtrlC:
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    def _pressed(self, number: int, frame: "FrameType | None") -> None:
+    def _pressed(self, number: int, frame: FrameType | None) -> None:
         import signal
 
         if self.at_once:
@@ -61,7 +58,7 @@ class _CtrlC:
         signal.setitimer(signal.ITIMER_REAL, _AGAIN)
 
 
-def _called_by_c(frame: "FrameType | None") -> bool:
+def _called_by_c(frame: FrameType | None) -> bool:
     """Whether what runs is part of an import, or of a callback from LLVM."""
     while frame:
         file = frame.f_code.co_filename

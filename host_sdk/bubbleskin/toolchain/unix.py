@@ -149,7 +149,9 @@ def build(folder: Path, checkout: Path | None, *, force: bool) -> None:
                 tag = None if checkout else f"v{VERSION}"  # a checkout describes itself
                 keep(compile_source(source, Path(name) / "build", runner, tag), folder)
     except (BubbleskinError, OSError) as problem:
-        raise BubbleskinError(f"MicroPython cannot be built here: {problem}\n{INSTEAD}") from problem
+        said = str(problem)
+        after = "\n" if "\n" in said else " "  # the end of a log keeps its lines
+        raise BubbleskinError(f"MicroPython cannot be built here: {said}{after}{INSTEAD}") from problem
 
 
 def micropython(checkout: Path | None = None, *, force: bool = False) -> Path:
