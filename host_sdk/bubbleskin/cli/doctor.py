@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bubbleskin import native
-from bubbleskin.cli.options import as_json
+from bubbleskin.cli.options import as_json, progress
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.warm import parts
 
@@ -63,7 +63,7 @@ def _warmed(console: Console) -> dict[str, float]:
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    with progress(console, *columns) as bar:
         task = bar.add_task("compiling …")
         all_parts = parts()
         for done, part in enumerate(all_parts):
