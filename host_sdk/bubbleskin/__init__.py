@@ -1,42 +1,32 @@
 """Heights in, shapes out: the SDK of the bubbleskin wristbands."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING
-
-from bubbleskin.async_skin import AsyncSkin
-from bubbleskin.connect import aconnect, connect
-from bubbleskin.device.faults import Fault
-from bubbleskin.device.health import Health, TickHistogram
-from bubbleskin.device.info import Info
-from bubbleskin.device.settings import Setting
-from bubbleskin.device.state import State
-from bubbleskin.device.store import StoreInfo
-from bubbleskin.device.trim import Trim
-from bubbleskin.errors import (
-    BubbleskinError,
-    DeviceFault,
-    DeviceRefused,
-    DeviceRestarted,
-    DeviceSilent,
-    InvalidInput,
-    LinkError,
-    NoEquilibrium,
-    Overtaken,
-    WrongDevice,
-)
-from bubbleskin.layout import Layout
-from bubbleskin.sequence import library as sequences
-from bubbleskin.sequence.model import Sequence
-from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus
-from bubbleskin.sequence.steps import After, Repeat, Settled, Step
-from bubbleskin.shape import shapes
-from bubbleskin.skin import Skin
-from bubbleskin.telemetry.recording import Recording
-
+TYPE_CHECKING = False  # as of `typing`, which is not waited for
 if TYPE_CHECKING:
+    from bubbleskin.async_skin import AsyncSkin
+    from bubbleskin.connecting import aconnect, connect
     from bubbleskin.contact.fit import ContactFit, Measured, fit_contact
     from bubbleskin.contact.model import CompliantContact, Shape
     from bubbleskin.contact.rigid import RigidContact
+    from bubbleskin.device.faults import Fault
+    from bubbleskin.device.health import Health, TickHistogram
+    from bubbleskin.device.info import Info
+    from bubbleskin.device.settings import Setting
+    from bubbleskin.device.state import State
+    from bubbleskin.device.store import StoreInfo
+    from bubbleskin.device.trim import Trim
+    from bubbleskin.errors import (
+        BubbleskinError,
+        DeviceFault,
+        DeviceRefused,
+        DeviceRestarted,
+        DeviceSilent,
+        InvalidInput,
+        LinkError,
+        NoEquilibrium,
+        Overtaken,
+        WrongDevice,
+    )
+    from bubbleskin.layout import Layout
     from bubbleskin.membrane import (
         Calibration,
         Table,
@@ -50,21 +40,59 @@ if TYPE_CHECKING:
     )
     from bubbleskin.planner.plan import Plan
     from bubbleskin.planner.search import plan
+    from bubbleskin.sequence import library as sequences
+    from bubbleskin.sequence.model import Sequence
+    from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus
+    from bubbleskin.sequence.steps import After, Repeat, Settled, Step
+    from bubbleskin.shape import shapes
+    from bubbleskin.skin import Skin
+    from bubbleskin.telemetry.recording import Recording
 
-# The physics takes scipy, which takes a second to import, and contact takes numba; a script that only shows heights
-# need not wait for them. A type checker finds them above.
-_LATER = {
+# Each name is imported when it is asked for: a script that only shows heights does not wait for scipy and numba, and the
+# command for nothing before it knows what Ctrl-C means. A type checker finds them above.
+_ROOMS = {
+    "After": "sequence.steps",
+    "AsyncSkin": "async_skin",
+    "BubbleskinError": "errors",
     "Calibration": "membrane",
     "CompliantContact": "contact.model",
     "ContactFit": "contact.fit",
+    "DeviceFault": "errors",
+    "DeviceRefused": "errors",
+    "DeviceRestarted": "errors",
+    "DeviceSilent": "errors",
+    "Fault": "device.faults",
+    "Health": "device.health",
+    "Info": "device.info",
+    "InvalidInput": "errors",
+    "Layout": "layout",
+    "LinkError": "errors",
     "Measured": "contact.fit",
+    "NoEquilibrium": "errors",
+    "Overtaken": "errors",
     "Plan": "planner.plan",
+    "PlaybackReport": "sequence.playback",
+    "PlaybackStatus": "sequence.playback",
+    "Recording": "telemetry.recording",
+    "Repeat": "sequence.steps",
     "RigidContact": "contact.rigid",
+    "Sequence": "sequence.model",
+    "Setting": "device.settings",
+    "Settled": "sequence.steps",
     "Shape": "contact.model",
+    "Skin": "skin",
+    "State": "device.state",
+    "Step": "sequence.steps",
+    "StoreInfo": "device.store",
     "Table": "membrane",
+    "TickHistogram": "device.health",
+    "Trim": "device.trim",
+    "WrongDevice": "errors",
     "YeohBalloon": "membrane",
     "YeohFit": "membrane",
+    "aconnect": "connecting",
     "build_table": "membrane",
+    "connect": "connecting",
     "fit_contact": "contact.fit",
     "fit_sheet": "membrane",
     "fit_yeoh": "membrane",
@@ -72,6 +100,7 @@ _LATER = {
     "preset": "membrane",
     "read_csv": "membrane",
 }
+_MODULES = {"sequences": "sequence.library", "shapes": "shape.shapes"}
 
 __all__ = [
     "After",
@@ -129,9 +158,20 @@ __all__ = [
 if not TYPE_CHECKING:  # where a checker saw this, it would take every misspelt name for something that is found here
 
     def __getattr__(name):
-        if name not in _LATER:
+        """A public name, or a room of the SDK, as if it had been imported before."""
+        from importlib import import_module
+        from importlib.util import find_spec
+
+        if name in _ROOMS:
+            found = getattr(import_module(f"bubbleskin.{_ROOMS[name]}"), name)
+        elif name in _MODULES:
+            found = import_module(f"bubbleskin.{_MODULES[name]}")
+        elif not name.startswith("_") and find_spec(f"bubbleskin.{name}"):
+            found = import_module(f"bubbleskin.{name}")
+        else:
             raise AttributeError(f"module 'bubbleskin' has no attribute {name!r}")
-        return getattr(import_module(f"bubbleskin.{_LATER[name]}"), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

@@ -24,6 +24,7 @@ _NO_NUMBERS = {
     "V": "records",
 }
 """Kinds of numpy's arrays that would become numbers without anybody noticing what got lost."""
+SEED_MAX = 2**32 - 1
 _SHOWN = 60
 _MOST = 10_000_000
 """Entries that are taken at all: of a heightfield 3000 by 3000, of measurements days."""
@@ -115,22 +116,38 @@ def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf
     """``value`` as one finite number from ``low`` to ``high``."""
     if type(value) is float and low <= value <= high and math.isfinite(value):
         return value
-    values = array(name, value)
-    if values.size != 1:
-        raise InvalidInput(f"{name} must be one number, not {values.size} of them.")
-    one = float(values.item())
+    one = _one(name, value)
     if not (math.isfinite(one) and low <= one <= high):
         raise InvalidInput(f"{name} is {with_unit(one, unit)}; {_range(low, high, unit)} is allowed.")
     return one
 
 
+def _one(name: str, value: Any) -> float:
+    """``value`` as one number; nan and inf pass."""
+    values = array(name, value)
+    if values.size != 1:
+        raise InvalidInput(f"{name} must be one number, not {values.size} of them.")
+    return float(values.item())
+
+
 def above_zero(name: str, value: Any, high: float = math.inf, unit: str = "") -> float:
     """``value`` as one finite number above zero, up to ``high``."""
-    one = number(name, value)
-    if not 0 < one <= high:
+    one = _one(name, value)
+    if not (math.isfinite(one) and 0 < one <= high):
         up_to = "" if high == math.inf else f", up to {with_unit(high, unit)}"
         raise InvalidInput(f"{name} is {with_unit(one, unit)}; it must be above zero{up_to}.")
     return one
+
+
+def written(name: str, text: str) -> float:
+    """The number that ``text`` is; infinite where it is beyond what a number can be, which no range takes."""
+    try:
+        if text.isascii() and "_" not in text:
+            return float(text)
+    except ValueError:
+        pass
+    point = f"; write {text.replace(',', '.')}" if text.count(",") == 1 else ""
+    raise InvalidInput(f"{name} is {shown(text)}, which is not a number{point}.")
 
 
 def whole(name: str, value: Any, low: int, high: int, unit: str = "") -> int:
@@ -201,7 +218,8 @@ def like(given: Numbers, result: Any) -> Numbers:
 
 def with_unit(value: float, unit: str) -> str:
     """A number and its unit."""
-    return f"{value:g} {unit}" if unit else f"{value:g}"
+    number = str(value) if isinstance(value, int) else f"{value:g}"
+    return f"{number} {unit}" if unit else number
 
 
 def _range(low: float, high: float, unit: str) -> str:
@@ -212,4 +230,4 @@ def _range(low: float, high: float, unit: str) -> str:
         return f"{with_unit(low, unit)} or more"
     if low == -math.inf:
         return f"up to {with_unit(high, unit)}"
-    return f"{low:g} to {with_unit(high, unit)}"
+    return f"{with_unit(low, '')} to {with_unit(high, unit)}"

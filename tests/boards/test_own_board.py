@@ -10,7 +10,7 @@ import pytest
 
 import bubbleskin as bs
 from bubbleskin import boards
-from bubbleskin.cli.main import main
+from bubbleskin.cli.command import main
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.flash import mpy
 from bubbleskin.membrane import YeohBalloon, build_table

@@ -10,7 +10,8 @@ import tty
 
 import pytest
 
-from bubbleskin.cli.main import main
+import bubbleskin as bs
+from bubbleskin.cli.command import main
 
 SIM = ["--device", "sim://wristband7"]
 
@@ -51,15 +52,15 @@ def assert_one_sentence(outcome, status, *words):
         (["show", *["8"] * 6, "high", *SIM], ["'high'", "not a height"]),
         (["show", *SIM], ["one way"]),
         (["show", "--all", "8", "--shape", "dome", *SIM], ["one way"]),
-        (["show", "--all", "8", "--over", "-1", *SIM], ["over is -1"]),
+        (["show", "--all", "8", "--over", "-1", *SIM], ["--over is -1"]),
         (["show", "--shape", "cube", *SIM], ["cube", "dome"]),
         (["show", "--file", "nowhere.csv", *SIM], ["nowhere.csv"]),
         (["info", "--device", "sim://wristband8"], ["wristband8", "wristband7"]),
         (["info", "--device", "sim://wristband7?speed=3"], ["speed", "realtime"]),
-        (["info", "--device", "sim://wristband7?seed=x"], ["seed='x'"]),
+        (["info", "--device", "sim://wristband7?seed=x"], ["seed of sim://wristband7 is 'x'"]),
         (["info", "--device", ""], ["empty"]),
         (["monitor", "--rate", "0", *SIM], ["rate_hz is 0"]),
-        (["monitor", "--rate", "nan", *SIM], ["rate_hz is nan"]),
+        (["monitor", "--rate", "nan", *SIM], ["--rate is nan"]),
         (["sim", "--spread", "2"], ["spread is 2"]),
         (["sim", "--plant", "nowhere.toml"], ["nowhere.toml"]),
         (["sim", "--rubber", "wood"], ["wood", "real"]),
@@ -174,6 +175,18 @@ def test_tables_go_to_the_wristband_and_come_back(run, tmp_path):
     assert "this is a wristband7" in wrong[2]
 
 
+def test_tables_that_look_wrong_are_uploaded_anyway(run, tmp_path):
+    odd = str(tmp_path / "odd.toml")
+    straight = bs.Table([5000, 14000], [0, 36000])
+    bs.Calibration("wristband7", (straight,) * 7).save(odd)
+    status, _, said = run("table", "--show", odd, "--upload", *SIM)
+    assert (status, said.count("\n")) == (2, 1)
+    assert "not one of rubber" in said
+    assert "--anyway" in said
+    assert run("table", "--show", odd, "--upload", "--anyway", *SIM)[0] == 0
+    assert_one_sentence(run("table", "--show", odd, "--anyway", *SIM), 2, "--anyway goes with --upload")
+
+
 # Sequences.
 
 
@@ -199,7 +212,7 @@ def test_play_takes_files_and_prints_json(run, tmp_path):
     [
         (["nothing"], ["'nothing'", "pulse", "flat-twin"]),
         (["nowhere.json"], ["nowhere.json", "Cannot read"]),
-        (["pulse", "--loops", "-1"], ["plays -1 times"]),
+        (["pulse", "--loops", "-1"], ["--loops is -1"]),
         (["pulse", "--at", "nan"], ["at is nan"]),
     ],
 )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bubbleskin.cli.main import main
+from bubbleskin.cli.command import main
 from bubbleskin.flash.machine import ThisMachine
 
 

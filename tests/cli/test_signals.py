@@ -62,3 +62,49 @@ def test_ctrl_c_ends_with_130_and_no_traceback(verb):
     assert said[-1] == "Stopped.\n"
     if verb.startswith("play"):
         assert told.rindex("sent STOP") < told.rindex("sent VENT"), "closed at once, then vented: its MicroPython lives"
+
+
+FIRST_SECOND = (0.0, 0.05, 0.15, 0.4, 0.7, 1.0)
+"""Seconds after which Ctrl-C is pressed: while Python starts, while the command is imported, while its verb imports more."""
+PYTHONS_OWN = ("init_import_site", "Could not import runpy module", "_get_module_details")
+"""What Python says that is interrupted before a line of ours runs: nobody can mend that."""
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("verb", ["info", "plan", "plot", "demo"])
+@pytest.mark.parametrize("seconds", FIRST_SECOND)
+def test_ctrl_c_within_the_first_second(verb, seconds, tmp_path):
+    arguments = {
+        "info": ["info", *SIM],
+        "plan": ["plan", "--shape", "dome"],
+        "plot": ["plot", "curve"],
+        "demo": ["demo", *SIM],
+    }
+    running = subprocess.Popen(
+        RUN + arguments[verb],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    threading.Event().wait(seconds)
+    running.send_signal(signal.SIGINT)
+    said = running.communicate(timeout=60)[1]
+    if running.returncode == -signal.SIGINT or any(one in said for one in PYTHONS_OWN):
+        assert "bubbleskin" not in said, "Python had not come to us"
+        return
+    assert "Traceback" not in said
+    if running.returncode == 0:
+        assert seconds >= 0.4, "all was done before"
+        return
+    assert running.returncode == 130
+    assert said.split("\n")[-2:] == ["Stopped.", ""]
+    assert said.count("Stopped.") == 1
+
+
+def test_nothing_that_takes_long_is_imported_before_ctrl_c_is_understood():
+    code = "import sys; before = set(sys.modules); import bubbleskin.cli; print(*set(sys.modules) - before)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) - {"types"} == {"bubbleskin", "bubbleskin.cli", "bubbleskin.cli.entry"}

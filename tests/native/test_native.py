@@ -1,14 +1,20 @@
 """Native code is kept and found again, by what it is made of; who runs it does not wait for numba."""
 
 import os
+import resource
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import bubble_firmware
+import bubble_protocol
 from bubbleskin import native
+from bubbleskin.native.said import COMPILING
 
 
 @pytest.fixture
@@ -57,7 +63,7 @@ def test_where_nothing_can_be_kept_every_start_compiles_and_says_so(loaded, cach
     cache.parent.write_text("a file where a folder should be")
     assert [loaded(), loaded()] == [(42, True), (42, True)]
     told = capsys.readouterr().err
-    assert told.count(f"Native code cannot be kept in {cache}, so every start compiles: Not a directory.") == 1
+    assert told.count(f"Compiled code cannot be kept in {cache}, so every start compiles: Not a directory.") == 1
     with pytest.raises(NotADirectoryError):
         loaded(unkept=False)
 
@@ -86,11 +92,39 @@ def run(cache, code: str = ADDED) -> tuple[list[str], str]:
 def test_two_processes_may_compile_at_once_and_say_so_and_a_third_does_not_import_numba(tmp_path):
     with ThreadPoolExecutor() as pool:
         both = list(pool.map(run, [tmp_path] * 2))
-    said = "Compiling the simulation for this computer, once: up to 20 s.\n"
+    said = f"{COMPILING}\n"
     assert [words[0] for words, _ in both] == ["42", "42"]
     assert said in {told for _, told in both} <= {"", said}
     assert len(list((tmp_path / "bubbleskin" / "native").iterdir())) == 1
     assert run(tmp_path) == (["42", "False"], "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hurt", ["no folder", "full disk"])
+def test_numbas_cache_is_not_compulsory_either(tmp_path, hurt):
+    """The package where nothing can be written, a home that is none; or a disk that is full once all is compiled."""
+    sources = Path(native.__file__).parents[1]
+    for package in (sources, Path(bubble_protocol.__path__[0]), Path(bubble_firmware.__path__[0])):
+        shutil.copytree(package, tmp_path / package.name, ignore=shutil.ignore_patterns("__pycache__"))
+    home = tmp_path / "home"
+    if hurt == "no folder":
+        home.write_text("a file")
+        (tmp_path / "bubbleskin/contact/__pycache__").write_text("a file")
+    environment = {name: value for name, value in os.environ.items() if name != "XDG_CACHE_HOME"}
+    environment |= {"HOME": str(home), "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "bubbleskin", "plan", "8", "8", "8", "8", "8", "8", "8"],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: hurt == "no folder" or resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000)),
+    )
+    assert done.returncode == 0, done.stderr
+    said = [line for line in done.stderr.splitlines() if line.strip()]
+    reason = {"no folder": "no folder can be written to", "full disk": "File too large"}[hurt]
+    unkept = f"Compiled code cannot be kept in numba's cache, so every start compiles: {reason}."
+    assert sorted(said) == sorted([COMPILING, unkept])
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 import bubbleskin as bs
-from bubbleskin.cli.main import main
+from bubbleskin.cli.command import main
 from bubbleskin.errors import InvalidInput
 from bubbleskin.plot import contact
 from bubbleskin.plot.sequence import Frame, animate

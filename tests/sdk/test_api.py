@@ -44,7 +44,8 @@ def test_a_script_that_only_shows_heights_does_not_wait_for_the_physics():
 @pytest.mark.slow
 def test_help_does_not_wait_for_the_physics():
     assert (
-        imported("from bubbleskin.cli.main import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass") == []
+        imported("from bubbleskin.cli.command import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass")
+        == []
     )
     assert imported("import bubbleskin\nbubbleskin.YeohBalloon()") == []
     assert imported("from scipy import optimize") == ["scipy"]

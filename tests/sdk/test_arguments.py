@@ -120,6 +120,10 @@ OTHERS = {
     "Calibration.load": lambda a, b: bs.Calibration.load(a),
     "RigidContact": lambda a, b: bs.RigidContact(a),
     "CompliantContact": lambda a, b: bs.CompliantContact(a),
+    "CompliantContact seed": lambda a, b: bs.CompliantContact(bs.Layout.hexagon(), seed=a),
+    "SimulatedBoard": lambda a, b: bs.sim.SimulatedBoard(a),
+    "SimulatedBoard seed": lambda a, b: bs.sim.SimulatedBoard("wristband7", seed=a),
+    "SimulatedBoard spread": lambda a, b: bs.sim.SimulatedBoard("wristband7", spread=a),
     "CompliantContact kz": lambda a, b: bs.CompliantContact(bs.Layout.hexagon(), kz=a),
 }  # fmt: skip
 

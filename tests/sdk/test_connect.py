@@ -65,10 +65,10 @@ def connecting(url):
         ("micropython://wristband8", ["'wristband8'", "wristband7 and wristband19"]),
         ("sim://wristband7/seed=3", ["not a simulated board", "sim://wristband7?seed=3"]),
         ("sim://wristband7?speed=2", ["'speed'", "seed, spread, realtime"]),
-        ("sim://wristband7?seed=x", ["seed='x'", "not a whole number"]),
+        ("sim://wristband7?seed=x", ["seed of sim://wristband7 is 'x'", "which is not a number"]),
         ("sim:wristband7", ["sim://wristband7"]),
-        ("sim://wristband7?seed=-1", ["seed is -1"]),
-        ("sim://wristband7?seed", ["seed=''"]),
+        ("sim://wristband7?seed=-1", ["seed of sim://wristband7 is -1", "0 to 4294967295"]),
+        ("sim://wristband7?seed", ["seed of sim://wristband7 is ''"]),
         ("sim://wristband7?loss=2", ["drop is 2", "0 to 1"]),
         ("sim://wristband7?spread=0.6", ["spread is 0.6", "0 to 0.5"]),
         ("sim://wristband7?spread=nan", ["spread is nan"]),
@@ -91,7 +91,8 @@ def test_a_timeout_that_cannot_be_meant(port, timeout):
 def test_a_micropython_that_is_not_there(monkeypatch, tmp_path):
     monkeypatch.delenv("MICROPYTHON", raising=False)
     monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path))
-    fails(bs.BubbleskinError, "has not been built", "make micropython", act=connecting("micropython://wristband7"))
+    monkeypatch.setenv("PATH", str(tmp_path))  # nor anything that could build one
+    fails(bs.BubbleskinError, "cannot be built here", "Set MICROPYTHON=", act=connecting("micropython://wristband7"))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
-from bubbleskin.cli.main import main
+from bubbleskin.cli.command import main
 from bubbleskin.link.link import Link, run_sync
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport
 from bubbleskin.skin import AsyncSkin, Skin

@@ -161,7 +161,7 @@ def test_sensors_are_gauges_at_any_altitude(rubber):
     [
         ("rubber=wood", "rubber is 'wood', but must be one of 'ideal', 'real'."),
         ("sheet=steel", "sheet is 'steel', but must be one of 'paper', 'stiff25'"),
-        ("gas_c=warm", "gas_c='warm', which is not a number"),
+        ("gas_c=warm", "gas_c of sim://wristband7 is 'warm', which is not a number"),
         ("gas_c=400", "gas_c is 400 °C; -20 to 60 °C is allowed."),
         ("atmosphere_kpa=nan", "atmosphere_kpa is nan kPa; 50 to 120 kPa is allowed."),
         ("viscosity=0", "viscosity is 0 times the nominal; 0.05 to 20 times the nominal is allowed."),

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from bubbleskin.cli.main import main
+from bubbleskin.cli.command import main
 
 
 @pytest.fixture

@@ -94,7 +94,7 @@ def test_the_key_of_a_build_names_version_and_word_size_and_follows_the_options(
 def test_what_micropython_names_comes_before_what_was_built(monkeypatch, tmp_path):
     monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path))
     monkeypatch.delenv("MICROPYTHON", raising=False)
-    with pytest.raises(BubbleskinError, match=r"tools/build_micropython\.py.* or set MICROPYTHON"):
+    with pytest.raises(BubbleskinError, match=r"The first `micropython://` does that.* or set MICROPYTHON"):
         interpreter.find_micropython()
     interpreter.build_folder().mkdir(parents=True)
     built = program(interpreter.build_folder() / "micropython", "built")
@@ -141,7 +141,7 @@ def test_machines_that_cannot_build_are_told_why():
 def test_a_checkout_without_micropython_is_refused_before_anything_is_fetched(monkeypatch, tmp_path):
     monkeypatch.setenv("BUBBLESKIN_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(unix, "unsupported", lambda system, machine: None)
-    with pytest.raises(BubbleskinError, match=r"not a MicroPython checkout.*\n.*MICROPYTHON="):
+    with pytest.raises(BubbleskinError, match=r"not a MicroPython checkout.* MICROPYTHON="):
         unix.micropython(tmp_path)
     assert not (tmp_path / "cache").exists()
 
@@ -165,3 +165,58 @@ def test_a_failed_step_shows_the_end_of_its_log(tmp_path):
     assert "line 10" in text
     assert "line 9\n" not in text
     assert str(tmp_path / "counting.log") in text
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """What `pip install bubbleskin` puts on a machine without a checkout: a folder that holds the wheel's files."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    source = Path(__file__).parents[2]
+    subprocess.run([*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", folder, source], check=True, timeout=200)
+    (made,) = folder.glob("*.whl")
+    subprocess.run([*pip, "install", "--no-deps", "--target", folder / "installed", made], check=True, timeout=200)
+    return folder / "installed"
+
+
+def shows_from_wheel(wheel, cache, path):
+    """`bubbleskin show` on MicroPython out of a wheel: the process, once it has ended."""
+    environment = {name: value for name, value in os.environ.items() if name != "MICROPYTHON"}
+    environment |= {"PYTHONPATH": str(wheel), "BUBBLESKIN_CACHE": str(cache), "PATH": path}
+    command = [
+        sys.executable,
+        "-m",
+        "bubbleskin",
+        "show",
+        "--all",
+        "8",
+        "--device",
+        "micropython://wristband7?contact=0",
+    ]
+    return subprocess.run(command, env=environment, cwd=wheel, capture_output=True, text=True, timeout=500)
+
+
+@pytest.mark.slow
+def test_a_wheel_runs_the_micropython_that_was_built_before(wheel):
+    done = shows_from_wheel(wheel, interpreter.cache_folder(), os.environ["PATH"])
+    assert done.returncode == 0, done.stderr
+    assert "settled at" in done.stdout
+
+
+@pytest.mark.slow
+def test_a_wheel_that_cannot_build_micropython_says_what_to_do(wheel, tmp_path):
+    done = shows_from_wheel(wheel, tmp_path, "/nowhere")
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("MicroPython cannot be built here: ")
+    assert "Set MICROPYTHON=/path/to/micropython to use your own 32-bit build instead." in done.stderr
+
+
+@pytest.mark.chip
+def test_a_wheel_builds_micropython_where_there_is_none(wheel, tmp_path):
+    done = shows_from_wheel(wheel, tmp_path, os.environ["PATH"])
+    assert done.returncode == 0, done.stderr
+    assert "Compiling MicroPython: done" in done.stderr
+    assert "settled at" in done.stdout
+    again = shows_from_wheel(wheel, tmp_path, "/nowhere")
+    assert (again.returncode, again.stderr) == (0, "")

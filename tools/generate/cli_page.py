@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import generated
 
-from bubbleskin.cli.main import bubbleskin
+from bubbleskin.cli.command import bubbleskin
 
 HEAD = """# The command line
 

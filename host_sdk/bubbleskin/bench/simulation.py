@@ -7,7 +7,7 @@ import numpy as np
 
 from bubbleskin.bench.rows import Row, share_of
 from bubbleskin.boards import DEFAULT, NAMES
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 
 _SECONDS = 20.0
 """Of virtual time, for each row."""

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from bubbleskin.bench.rows import REPEATS, Row, share_of
 
 _STATE = "import bubbleskin as bs; bs.connect('sim://wristband7').state()"
-_HELP = "from bubbleskin.cli.main import main; main(['--help'])"
-_INFO = "from bubbleskin.cli.main import main; main(['info', '--device', 'sim://wristband7'])"
+_HELP = "from bubbleskin.cli.command import main; main(['--help'])"
+_INFO = "from bubbleskin.cli.command import main; main(['info', '--device', 'sim://wristband7'])"
 
 
 def rows(size: float = 1.0) -> Iterator[Row]:

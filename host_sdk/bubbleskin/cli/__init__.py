@@ -1,5 +1,5 @@
 """The `bubbleskin` command: verbs only, no logic."""
 
-from bubbleskin.cli.main import main
+from bubbleskin.cli.entry import main
 
 __all__ = ["main"]

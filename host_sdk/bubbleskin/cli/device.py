@@ -12,9 +12,8 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from rich.table import Table
 
 from bubbleskin import boards
-from bubbleskin.checks import number
-from bubbleskin.cli.options import as_json, device, gathered
-from bubbleskin.connect import connect
+from bubbleskin.cli.options import Real, as_json, device, gathered, progress
+from bubbleskin.connecting import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
 from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
@@ -71,7 +70,7 @@ def demo(device: str, output: Path) -> None:
 
 def _progress(console: Console) -> Progress:
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[off]}"), TimeElapsedColumn())
-    return Progress(*columns, console=console, transient=True)
+    return progress(console, *columns)
 
 
 def _reached(state: State, skin: Skin, title: str) -> Table:
@@ -126,16 +125,18 @@ class _Way(NamedTuple):
 
 @click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("heights", nargs=-1, metavar="[MM]...")
-@click.option("--all", "everywhere", type=float, metavar="MM", help="The same height for every bubble.")
+@click.option("--all", "everywhere", type=Real(), metavar="MM", help="The same height for every bubble.")
 @click.option("--shape", type=click.Choice(list(shapes.SHAPES)), help="A ready-made shape.")
 @click.option(
     "--file", "path", type=click.Path(dir_okay=False, path_type=Path), help="A heightfield: .npy, or numbers in .csv."
 )
 @click.option("--fill", type=click.Choice(FILLS), help="What entries of --file that are not known are given.")
-@click.option("--over", type=float, default=0.0, show_default=True, help="Seconds the change should take.")
+@click.option(
+    "--over", type=Real(0.0, unit="s"), default=0.0, show_default=True, help="Seconds the change should take."
+)
 @click.option(
     "--hold",
-    type=click.FloatRange(min=0),
+    type=Real(0.0, unit="s"),
     default=0.0,
     show_default=True,
     help="Seconds to hold it for; a wristband vents 1 s after its host has gone.",
@@ -145,7 +146,6 @@ class _Way(NamedTuple):
 @gathered(way=_Way)
 def show(way: _Way, over: float, hold: float, device: str | None, json: bool) -> None:
     """Take a shape: one height in MM per bubble, or one of --all, --shape, --file."""
-    number("--hold", hold, 0.0)
     heights, everywhere, shape, path, fill = way
     given = [bool(heights), everywhere is not None, shape is not None, path is not None]
     if sum(given) != 1:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-from bubbleskin.cli.options import Board, as_json
+from bubbleskin.cli.options import Board, as_json, progress
 from bubbleskin.errors import InvalidInput
 
 
@@ -58,7 +58,7 @@ def flash(
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    with progress(console, *columns) as bar:
         task = bar.add_task("looking for the wristband")
 
         def report(title: str, done: int, total: int) -> None:

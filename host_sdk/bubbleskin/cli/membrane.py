@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import click
 
 from bubbleskin import boards
-from bubbleskin.cli.options import device, gathered
-from bubbleskin.connect import connect
+from bubbleskin.cli.options import Real, Whole, device, gathered
+from bubbleskin.connecting import connect
 from bubbleskin.errors import InvalidInput
 
 if TYPE_CHECKING:  # physics and plot load scipy and matplotlib, so a verb imports them when it runs
@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # physics and plot load scipy and matplotlib, so a verb impor
 
 F = TypeVar("F", bound=Callable[..., Any])
 DATA = click.Path(dir_okay=False, path_type=Path)
+HEIGHT = Real(above_zero=True, high=1000.0, unit="mm")
 
 
 class TableForm(NamedTuple):
@@ -46,6 +47,7 @@ class Use(NamedTuple):
     output: Path | None
     upload: bool
     save: bool
+    anyway: bool
 
 
 class Sizes(NamedTuple):
@@ -68,8 +70,20 @@ def _options(*options: Callable[[F], F]) -> Callable[[F], F]:
 
 size_options = _options(
     click.option("--wall", type=click.Choice(["thin", "thick"]), default="thin", show_default=True),
-    click.option("--thickness-mm", type=float, default=1.0, show_default=True, help="Wall at rest."),
-    click.option("--diameter-mm", type=float, default=5.0, show_default=True, help="Diameter at rest."),
+    click.option(
+        "--thickness-mm",
+        type=Real(above_zero=True, high=100.0, unit="mm"),
+        default=1.0,
+        show_default=True,
+        help="Wall at rest.",
+    ),
+    click.option(
+        "--diameter-mm",
+        type=Real(above_zero=True, high=1000.0, unit="mm"),
+        default=5.0,
+        show_default=True,
+        help="Diameter at rest.",
+    ),
     click.option(
         "--diameter-is",
         type=click.Choice(["mid", "inner", "outer"]),
@@ -80,13 +94,25 @@ size_options = _options(
 )
 fit_options = _options(
     size_options,
-    click.option("--height-noise-mm", type=float, default=0.05, show_default=True, help="One sigma."),
-    click.option("--pressure-noise-kpa", type=float, default=0.15, show_default=True, help="One sigma."),
+    click.option(
+        "--height-noise-mm",
+        type=Real(above_zero=True, high=100.0, unit="mm"),
+        default=0.05,
+        show_default=True,
+        help="One sigma.",
+    ),
+    click.option(
+        "--pressure-noise-kpa",
+        type=Real(above_zero=True, high=1000.0, unit="kPa"),
+        default=0.15,
+        show_default=True,
+        help="One sigma.",
+    ),
     click.option("--pooled", is_flag=True, help="One curve through all bubbles of the file."),
     click.option("--skip-bad-rows", is_flag=True, help="Leave bad rows out and name them."),
     click.option(
         "--first",
-        type=click.IntRange(0, 1),
+        type=Whole(0, 1),
         default=0,
         show_default=True,
         help="The file's number of what is bubble 0 here.",
@@ -94,16 +120,16 @@ fit_options = _options(
 )
 material_options = _options(
     click.option("--preset", default="paper", show_default=True, help="paper, ecoflex-00-30, ..."),
-    click.option("--mu-kpa", type=float, help="Shear modulus, instead of the preset's."),
-    click.option("--c1-kpa", type=float, help="C1 = mu / 2, the other way to give it."),
-    click.option("--c2-pa", type=float, help="Instead of the preset's."),
-    click.option("--c3-pa", type=float, help="Instead of the preset's."),
+    click.option("--mu-kpa", type=Real(), help="Shear modulus, instead of the preset's."),
+    click.option("--c1-kpa", type=Real(), help="C1 = mu / 2, the other way to give it."),
+    click.option("--c2-pa", type=Real(), help="Instead of the preset's."),
+    click.option("--c3-pa", type=Real(), help="Instead of the preset's."),
     size_options,
 )
 table_options = _options(
     click.option("--board", default=boards.DEFAULT, show_default=True, help="Name kept in the file."),
-    click.option("--knots", type=int, default=64, show_default=True, help="Knots per table, 64 at most."),
-    click.option("--up-to-mm", type=float, default=14.0, show_default=True, help="Where the tables end."),
+    click.option("--knots", type=Whole(2, 64), default=64, show_default=True, help="Knots per table, 64 at most."),
+    click.option("--up-to-mm", type=HEIGHT, default=14.0, show_default=True, help="Where the tables end."),
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
@@ -146,10 +172,13 @@ def fit(data: Path, form: TableForm, output: Path | None, picture: Path | None, 
 @click.option("--show", type=DATA, help="Read a calibration file instead of making one.")
 @click.option("--from-device", is_flag=True, help="Read the tables that the wristband uses instead of making some.")
 @click.option("--compare", type=DATA, help="Say how this other calibration file differs; status 1 if so.")
-@click.option("--bubbles", type=int, default=7, show_default=True, help="How many equal tables to make.")
+@click.option("--bubbles", type=Whole(1, 1000), default=7, show_default=True, help="How many equal tables to make.")
 @click.option("-o", "--output", type=DATA, help="Write a calibration file.")
 @click.option("--upload", is_flag=True, help="Let the wristband use these tables, until it restarts.")
 @click.option("--save", is_flag=True, help="With --upload: for good. The wristband must be vented.")
+@click.option(
+    "--anyway", is_flag=True, help="With --upload: tables that are none of rubber, or contradict each other, too."
+)
 @device
 @json_option
 @gathered(source=Source, use=Use, form=TableForm)
@@ -164,6 +193,8 @@ def table(
 
     if use.save and not use.upload:
         raise InvalidInput("--save goes with --upload: it keeps the tables that are uploaded.")
+    if use.anyway and not use.upload:
+        raise InvalidInput("--anyway goes with --upload: it uploads what looks wrong.")
     calibration = _find_tables(source, form, device, **options)
     click.echo(json.dumps(calibration.as_dict(), indent=2) if as_json else calibration.report())
     if use.output:
@@ -171,7 +202,7 @@ def table(
         click.echo(f"wrote {use.output}", err=True)
     if use.upload:
         with connect(device) as skin:
-            skin.upload_tables(calibration, use.save)
+            skin.upload_tables(calibration, use.save, anyway=use.anyway)
         until = "from now on" if use.save else "until it restarts"
         click.echo(f"{calibration.board} uses these tables, CRC {calibration.crc32:08x}, {until}", err=True)
     if compare:

@@ -9,9 +9,8 @@ import click
 from rich.console import Console
 from rich.live import Live
 
-from bubbleskin.checks import above_zero
-from bubbleskin.cli.options import as_json, device
-from bubbleskin.connect import connect
+from bubbleskin.cli.options import Real, as_json, device
+from bubbleskin.connecting import connect
 from bubbleskin.telemetry.recording import Table
 
 _SHOWN = ("height", "pressure", "target", "status", "faults")
@@ -20,10 +19,10 @@ _PINGED = 1.0
 
 
 @click.command()
-@click.option("--rate", type=float, default=20.0, show_default=True, help="Times a second.")
+@click.option("--rate", type=Real(), default=20.0, show_default=True, help="Times a second.")
 @click.option(
     "--seconds",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Real(above_zero=True, unit="s"),
     help="End after so many seconds of device time; without it, at Ctrl-C.",
 )
 @click.option(
@@ -38,9 +37,6 @@ _PINGED = 1.0
 def monitor(rate: float, seconds: float | None, path: Path | None, device: str | None, json: bool) -> None:
     """Watch heights, pressures and faults live; with --json, a line for each state."""
     from bubbleskin.plot.terminal import Monitor
-
-    if seconds is not None:
-        above_zero("--seconds", seconds, unit="s")
 
     console = Console()
     with connect(device) as skin, contextlib.ExitStack() as open_files:

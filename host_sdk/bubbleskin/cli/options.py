@@ -1,13 +1,17 @@
 """Options that several verbs share."""
 
+import math
 from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
 import click
+from rich.console import Console
+from rich.progress import Progress, ProgressColumn
 
-from bubbleskin import boards
+from bubbleskin import boards, checks
 from bubbleskin.errors import InvalidInput
+from bubbleskin.sequence.steps import TIMES_MAX
 
 
 class Board(click.ParamType):
@@ -26,6 +30,56 @@ class Board(click.ParamType):
         except InvalidInput as error:
             self.fail(str(error), param, ctx)
         return str(own or value)
+
+
+class Real(click.ParamType):
+    """A number from `low` to `high`, checked as those of the SDK are; `above_zero` leaves 0 out."""
+
+    name = "float"
+
+    def __init__(
+        self, low: float = -math.inf, high: float = math.inf, unit: str = "", *, above_zero: bool = False
+    ) -> None:
+        self.low, self.high, self.unit, self.above_zero = low, high, unit, above_zero
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Refuse what is no number, and numbers beyond the range."""
+        name = _name(param)
+        number = _number(name, value)
+        if self.above_zero:
+            return checks.above_zero(name, number, self.high, self.unit)
+        return checks.number(name, number, self.low, self.high, self.unit)
+
+
+class Whole(click.ParamType):
+    """A whole number from `low` to `high`, checked as those of the SDK are."""
+
+    name = "integer"
+
+    def __init__(self, low: int, high: int) -> None:
+        self.low, self.high = low, high
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Refuse what is no whole number, and numbers beyond the range."""
+        name = _name(param)
+        return checks.whole(name, _number(name, value), self.low, self.high)
+
+
+def _name(param: click.Parameter | None) -> str:
+    return param.opts[-1] if param else "The number"
+
+
+def _number(name: str, value: Any) -> float:
+    return checks.written(name, value) if isinstance(value, str) else float(value)
+
+
+SEED = Whole(0, checks.SEED_MAX)
+LOOPS = Whole(0, TIMES_MAX)
+
+
+def progress(console: Console, *columns: ProgressColumn) -> Progress:
+    """Bars that go away: for who looks at a terminal, and no line of a file that keeps what was said."""
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 device = click.option(

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bubbleskin import boards
-from bubbleskin.cli.options import Board, as_json
+from bubbleskin.cli.options import Board, as_json, progress
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.shape import shapes
@@ -58,7 +58,7 @@ def plan(
     )
     contact = CompliantContact(layout)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with progress(Console(stderr=True), *columns) as bar:
         task = bar.add_task("planning …", total=None)
 
         def report(tried: int, error: float) -> None:

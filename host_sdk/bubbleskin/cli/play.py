@@ -8,8 +8,8 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from bubbleskin.cli.options import as_json, device
-from bubbleskin.connect import connect
+from bubbleskin.cli.options import LOOPS, Real, as_json, device
+from bubbleskin.connecting import connect
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.library import LIBRARY
@@ -19,8 +19,8 @@ from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus
 
 @click.command()
 @click.argument("what", metavar=f"FILE|{'|'.join(LIBRARY)}")
-@click.option("--loops", type=int, help="How often to play it all; 0: until Ctrl-C. Default: as the sequence says.")
-@click.option("--at", type=float, metavar="S", help="Device time at which to begin; default: at once.")
+@click.option("--loops", type=LOOPS, help="How often to play it all; 0: until Ctrl-C. Default: as the sequence says.")
+@click.option("--at", type=Real(0.0, unit="s"), metavar="S", help="Device time at which to begin; default: at once.")
 @device
 @as_json
 def play(what: str, loops: int | None, at: float | None, device: str | None, json: bool) -> None:

@@ -7,13 +7,21 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.progress import Progress
 
 from bubbleskin import boards
-from bubbleskin.cli.membrane import DATA, balloon, draw_fit, fit_file, fit_options, material_options, picture_option
-from bubbleskin.cli.options import Board
+from bubbleskin.cli.membrane import (
+    DATA,
+    HEIGHT,
+    balloon,
+    draw_fit,
+    fit_file,
+    fit_options,
+    material_options,
+    picture_option,
+)
+from bubbleskin.cli.options import LOOPS, SEED, Board, Real, Whole, progress
 from bubbleskin.cli.play import load
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 from bubbleskin.sequence.library import LIBRARY
 
 
@@ -24,7 +32,7 @@ def plot() -> None:
 
 @plot.command("curve")
 @material_options
-@click.option("--up-to-mm", type=float, default=14.0, show_default=True, help="Where the curve ends.")
+@click.option("--up-to-mm", type=HEIGHT, default=14.0, show_default=True, help="Where the curve ends.")
 @picture_option("curve")
 def plot_curve(preset: str, up_to_mm: float, output: Path, **options: Any) -> None:
     """Height against pressure: stable solid, unstable dashed, jumps marked."""
@@ -48,7 +56,7 @@ def plot_fit(data: Path, output: Path, **options: Any) -> None:
 
 @plot.command("table")
 @click.argument("calibration", type=DATA)
-@click.option("--bubble", type=int, default=0, show_default=True)
+@click.option("--bubble", type=Whole(0, 1000), default=0, show_default=True)
 @picture_option("table")
 def plot_table(calibration: Path, bubble: int, output: Path) -> None:
     """The knots of one bubble of the file CALIBRATION on their curve, with the error between them."""
@@ -60,7 +68,7 @@ def plot_table(calibration: Path, bubble: int, output: Path) -> None:
 
 
 @plot.command("figure4")
-@click.option("--seed", type=int, default=4, show_default=True)
+@click.option("--seed", type=SEED, default=4, show_default=True)
 @picture_option("figure4")
 def plot_figure_4(seed: int, output: Path) -> None:
     """Like figure 4 of the paper: height against pressure with the model, from simulated measurements."""
@@ -71,7 +79,7 @@ def plot_figure_4(seed: int, output: Path) -> None:
 
 
 @plot.command("figure6")
-@click.option("--seed", type=int, default=6, show_default=True)
+@click.option("--seed", type=SEED, default=6, show_default=True)
 @picture_option("figure6")
 def plot_figure_6(seed: int, output: Path) -> None:
     """Like figure 6 of the paper: how bubbles of one sheet differ, from simulated measurements."""
@@ -94,15 +102,15 @@ def plot_order(output: Path) -> None:
 @plot.command("sequence")
 @click.argument("what", metavar=f"FILE|{'|'.join(LIBRARY)}")
 @click.option("--board", type=Board(), default=boards.DEFAULT, show_default=True)
-@click.option("--loops", type=int, help="How often to play it all. Default: as the sequence says.")
-@click.option("--rate", type=click.IntRange(1, 50), default=15, show_default=True, help="Pictures a second.")
-@click.option("--seconds", type=float, default=30.0, show_default=True, help="At most so much of it.")
+@click.option("--loops", type=LOOPS, help="How often to play it all. Default: as the sequence says.")
+@click.option("--rate", type=Whole(1, 50), default=15, show_default=True, help="Pictures a second.")
+@click.option("--seconds", type=Real(0.0, 3600.0, "s"), default=30.0, show_default=True, help="At most so much of it.")
 @click.option("-o", "--output", type=DATA, default="sequence.gif", show_default=True, help=".gif, or .mp4 with ffmpeg.")
 def plot_sequence(what: str, board: str, loops: int | None, rate: int, seconds: float, output: Path) -> None:
     """A film of a sequence: the true shapes of a simulated wristband that plays it, from above and from the side."""
     from bubbleskin.plot import sequence as film
 
-    with Progress(console=Console(stderr=True), transient=True) as bar, connect(f"sim://{board}") as skin:
+    with progress(Console(stderr=True)) as bar, connect(f"sim://{board}") as skin:
         sequence = load(what, skin.layout, loops)
         task = bar.add_task("playing", total=min(sequence.duration, seconds))
         frames = film.watch(

@@ -4,16 +4,18 @@ import click
 from rich.console import Console
 
 from bubbleskin import boards
-from bubbleskin.cli.options import Board, as_json
+from bubbleskin.cli.options import SEED, Board, Real, Whole, as_json
 
 
 @click.command()
 @click.argument("board", type=Board(), default=boards.DEFAULT)
 @click.option(
-    "--port", type=int, help="Serve on this TCP port of this machine (0: a free one) instead of a pseudo-terminal."
+    "--port",
+    type=Whole(0, 65535),
+    help="Serve on this TCP port of this machine (0: a free one) instead of a pseudo-terminal.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of sensor noise and spread.")
-@click.option("--spread", type=float, default=0.0, show_default=True, help="How much parts differ: 0.1 for ± 10 %.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of sensor noise and spread.")
+@click.option("--spread", type=Real(), default=0.0, show_default=True, help="How much parts differ: 0.1 for ± 10 %.")
 @click.option("--rubber", type=click.Choice(["ideal", "real"]), help="What the bubbles are made of.  [default: ideal]")
 @click.option("--plant", type=click.Path(), help="The plant, from a file that `skin.simulated.write_plant` wrote.")
 @click.option("--micropython", is_flag=True, help="Run the firmware in a real MicroPython.")

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bubbleskin.cli.options import as_json, device
-from bubbleskin.connect import connect
+from bubbleskin.connecting import connect
 from bubbleskin.errors import InvalidInput
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bubbleskin.checks import finite, instance, number, one_of, positive
+from bubbleskin.checks import SEED_MAX, finite, instance, number, one_of, positive, whole
 from bubbleskin.contact import energy as core
 from bubbleskin.contact.continuation import FINE, Outcome, PathFollower, Resolution, Snap, ramps
 from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
@@ -110,7 +110,7 @@ class CompliantContact:
         for name, value in (("kz", kz), ("kxy", kxy), ("kc", kc), ("kbase", kbase)):
             positive(name, number(name, value), "N/m")
         self.kz, self.kxy, self.kc, self.kbase = float(kz), float(kxy), float(kc), float(kbase)
-        self.kick, self.seed = number("kick", kick), seed
+        self.kick, self.seed = number("kick", kick), whole("seed", seed, 0, SEED_MAX)
         self.bubbles = _bubble_records(layout, self.balloons)
         gap = layout.positions_mm[:, None] - layout.positions_mm[None]
         close = np.argwhere(np.triu(np.hypot(*gap.transpose(2, 0, 1)) < 1e-3, 1))

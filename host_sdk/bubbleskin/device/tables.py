@@ -63,7 +63,8 @@ def check(tables: "Sequence[Table]", info: Info) -> None:
             raise InvalidInput(
                 f"The table of bubble {bubble} is not one of rubber: of the nominal bubble's pressure it has {share[low]:.2f} at "
                 f"{heights_mm[low]:g} mm and {share[high]:.2f} at {heights_mm[high]:g} mm; they differ by at most a factor "
-                f"of {BENT_MOST:g} for known materials. Make it with `build_table` or from measurements; anyway=True uploads it."
+                f"of {BENT_MOST:g} for known materials. Make it with `build_table` or from measurements; anyway=True "
+                "(--anyway) uploads it."
             )
     middle = np.median(shares, axis=0)
     apart = np.maximum(shares / middle, middle / shares)
@@ -72,7 +73,7 @@ def check(tables: "Sequence[Table]", info: Info) -> None:
         raise InvalidInput(
             f"The tables contradict each other: bubble {bubble} has {shares[bubble, at] * usual[at] / 1e3:.1f} kPa at "
             f"{heights_mm[at]:g} mm and the middle one {middle[at] * usual[at] / 1e3:.1f} kPa; bubbles of one sheet are within a "
-            f"factor of {APART_MOST:g}. Measure the sheet again; anyway=True uploads them."
+            f"factor of {APART_MOST:g}. Measure the sheet again; anyway=True (--anyway) uploads them."
         )
 
 

@@ -5,7 +5,7 @@ who uses numba itself.
 """
 
 from bubbleskin.native.later import njit, resolve
-from bubbleskin.native.said import say_once
+from bubbleskin.native.said import UNKEPT, expect_compiling, say_once
 from bubbleskin.native.store import load
 
-__all__ = ["load", "njit", "resolve", "say_once"]
+__all__ = ["UNKEPT", "expect_compiling", "load", "njit", "resolve", "say_once"]

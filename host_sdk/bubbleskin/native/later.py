@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from bubbleskin.native.said import say_compiling
+from bubbleskin.native.said import say_compiling, say_unkept
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -27,13 +27,27 @@ class Later:
     def compiled(self) -> Any:
         """numba's function; those that it may call are numba's too from now on, as of `resolve`."""
         if self._made is None:
-            self._made = _numba().njit(**self._options)(self._function)
+            try:
+                self._made = _numba().njit(**self._options)(self._function)
+            except RuntimeError as error:  # there is no folder for numba's cache
+                self._do_without_cache(error)
             resolve(self._function.__globals__)
         return self._made
 
     def __call__(self, *arguments: Any) -> Any:
         """Compile it for these arguments, if that was not done before, and call it."""
-        return self.compiled(*arguments)
+        try:
+            return self.compiled(*arguments)
+        except OSError as error:  # the disk is full: raised once all is compiled, and before anything has run
+            self._do_without_cache(error)
+            return self._made(*arguments)
+
+    def _do_without_cache(self, error: Exception) -> None:
+        if not self._options.get("cache"):
+            raise error
+        self._options["cache"] = False
+        say_unkept("numba's cache", error)
+        self._made = _numba().njit(**self._options)(self._function)
 
 
 def resolve(names: dict[str, Any]) -> None:

@@ -17,7 +17,7 @@ import platformdirs
 from llvmlite import binding as llvm
 
 from bubbleskin.native.entry import OBJECTS, PREFIX
-from bubbleskin.native.said import say_compiling, say_once
+from bubbleskin.native.said import say_compiling, say_unkept
 
 _loaded: list[Any] = []  # engines and method tables: the functions live in them
 
@@ -43,11 +43,23 @@ def load(
 
         code = native_code(make())
         if kept:
-            handle, file = tempfile.mkstemp(dir=path.parent, suffix=".new")
-            with os.fdopen(handle, "wb") as new:
-                new.write(_digest(code) + b"\n" + code)
-            Path(file).replace(path)  # whole, whoever else does the same
+            _keep(code, path)
     return _functions(code)
+
+
+def _keep(code: bytes, path: Path) -> None:
+    """Write the file whole, whoever else does the same; where that fails, such as on a full disk, do without."""
+    try:
+        handle, file = tempfile.mkstemp(dir=path.parent, suffix=".new")
+    except OSError as error:
+        return say_unkept(str(path.parent), error)
+    try:
+        with os.fdopen(handle, "wb") as new:
+            new.write(_digest(code) + b"\n" + code)
+        Path(file).replace(path)
+    except OSError as error:
+        Path(file).unlink(missing_ok=True)
+        say_unkept(str(path.parent), error)
 
 
 def _room(folder: Path, unkept: bool) -> bool:
@@ -58,7 +70,7 @@ def _room(folder: Path, unkept: bool) -> bool:
     except OSError as error:
         if not unkept:
             raise
-        say_once(f"Native code cannot be kept in {folder}, so every start compiles: {error.strerror}.")
+        say_unkept(str(folder), error)
         return False
     return True
 

@@ -216,7 +216,7 @@ class _Search:
 
     def _is_sure(self, end: Shape) -> bool:
         """Whether the best path ends as in `end` with other nudges too, its pressures going either way."""
-        other = self._model.with_seed(self._model.seed + 1)
+        other = self._model.with_seed(self._model.seed ^ 1)
         ends = (other.settle(self._best, self._task.start, ramp=ramp) for ramp in ("height", "pressure"))
         return all(np.abs(shape.height_mm - end.height_mm).max() < self._task.tolerance_mm for shape in ends)
 

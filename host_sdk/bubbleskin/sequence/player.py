@@ -22,6 +22,7 @@ from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progres
 from bubbleskin.sequence.steps import Settled
 from bubbleskin.sequence.uploader import Uploader
 
+AT_MAX = 1e9  # seconds: some thirty years
 _STATES = {number: name for number, name, _ in sequences.STATES}
 _AFTER_TIMEOUT = {"hold": "its shape is held", "vent": "everything vents", "stop": "all valves are closed"}
 _POLL = 0.2
@@ -64,7 +65,7 @@ class Player:
     def _tick(self, at: float | None) -> int:
         if at is None:
             return 0
-        at = checks.number("at", at, unit="s")
+        at = checks.number("at", at, high=AT_MAX, unit="s")
         if at <= 0:
             raise InvalidInput(
                 f"A sequence cannot start at {at} s; give a device time in s, as of `state().time`, or None."

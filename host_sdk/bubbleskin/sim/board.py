@@ -1,6 +1,5 @@
 """Whole wristbands without hardware: what each of them is, and the one whose firmware is stepped in lockstep."""
 
-import math
 from abc import ABC, abstractmethod
 from array import array
 from dataclasses import replace
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from bubble_firmware.hal.lockstep import LINK_IN
 from bubbleskin import boards, checks
-from bubbleskin.errors import InvalidInput
 from bubbleskin.sim import plant_file
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
@@ -37,10 +35,8 @@ class Simulated(ABC):
     ):
         self.data = boards.load(board)
         """The board's file."""
-        if not (math.isfinite(spread) and 0 <= spread <= 0.5):
-            raise InvalidInput(f"spread is {spread}; give a share from 0 to 0.5, such as 0.1 for ± 10 %.")
-        if seed < 0:
-            raise InvalidInput(f"seed is {seed}; give a whole number from 0.")
+        spread = checks.number("spread", spread, 0.0, 0.5)
+        seed = checks.whole("seed", seed, 0, checks.SEED_MAX)
         self.name: str = self.data.NAME
         self.tick_s: float = self.data.TICK_US * 1e-6
         """Length of one control period, s."""
@@ -128,7 +124,7 @@ class SimulatedBoard(Simulated):
     ):
         super().__init__(board, seed=seed, spread=spread, contact=contact, **options)
         n = self.data.BUBBLES
-        self.firmware = firmware or InProcessFirmware(self.data, seed + 1, flash)
+        self.firmware = firmware or InProcessFirmware(self.data, self._seed + 1, flash)
         self._pulses = np.zeros((n, 2))
         self._pulses[:, 1] = self.tick_s
         self._pump = 0.0  # duty, 0 to 1

@@ -15,7 +15,8 @@ from bubble_firmware.hal.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
 from bubbleskin import boards
 from bubbleskin.errors import LinkError
 from bubbleskin.sim.firmware import Firmware, Outputs
-from bubbleskin.toolchain.interpreter import find_micropython
+from bubbleskin.toolchain.interpreter import own_micropython
+from bubbleskin.toolchain.unix import micropython
 
 HEAP = "448k"
 """What the firmware needs here: 116 kB of data (19 bubbles), as on the Pico, which has 237 kB for them. In this heap
@@ -42,7 +43,7 @@ class MicroPythonFirmware(Firmware):
     """A `Firmware` in another process, talked to through `bubble_firmware.hal.lockstep`."""
 
     def __init__(self, board: ModuleType, boot_id: int, boot_ticks: int = -1):
-        interpreter = find_micropython()
+        interpreter = own_micropython() or micropython()  # built now where it has not been, which is said
         path = source_path()
         own = boards.own_file(board)
         if own:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import cast
 
+from bubbleskin import checks
 from bubbleskin.errors import InvalidInput
 from bubbleskin.sim.recipe import NUMBERS, PlantOptions
 
@@ -48,11 +49,11 @@ class Options:
 
 
 def _number(name: str, text: str, url: str) -> float:
-    try:
-        return float(text) if name in _REAL else int(text)
-    except ValueError:
-        kind = "a number" if name in _REAL else "a whole number"
-        raise InvalidInput(f"{url} has {name}={text!r}, which is not {kind}.") from None
+    shown = f"{name} of {url}"
+    number = checks.written(shown, text)
+    if name in _REAL:
+        return number  # its range is the board's to say
+    return checks.whole(shown, number, 0, checks.SEED_MAX if name == "seed" else 1)
 
 
 def _file(name: str, url: str) -> Path:

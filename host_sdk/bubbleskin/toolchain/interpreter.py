@@ -1,4 +1,4 @@
-"""Where the real MicroPython lies: the interpreter that `tools/build_micropython.py` builds, or one's own."""
+"""Where the real MicroPython lies: the interpreter that `toolchain.unix` builds, or one's own."""
 
 import hashlib
 import os
@@ -53,7 +53,7 @@ def own_micropython() -> Path | None:
     if not path.is_file():
         raise BubbleskinError(
             f"MICROPYTHON is set to {named}, which is not a file. Set it to the path of a 32-bit MicroPython "
-            "(unix port), or unset it to use the one that `python tools/build_micropython.py` builds."
+            "(unix port), or unset it: then one is built where it is needed first."
         )
     if not os.access(path, os.X_OK):
         raise BubbleskinError(
@@ -74,8 +74,7 @@ def find_micropython() -> Path:
     built = build_folder() / "micropython"
     if not built.is_file():
         raise BubbleskinError(
-            f"MicroPython {VERSION} has not been built on this machine yet. Run `python "
-            "tools/build_micropython.py` (or `make micropython`) once, or set MICROPYTHON to the path of a "
-            "32-bit MicroPython (unix port)."
+            f"MicroPython {VERSION} has not been built on this machine yet. The first `micropython://` does that, in a minute "
+            "or two, on Linux with apt-get; or set MICROPYTHON to the path of a 32-bit MicroPython (unix port)."
         )
     return built

@@ -107,8 +107,8 @@ def prove(interpreter: Path) -> str:
     if sums != ["-9", "True", "True"]:
         raise BubbleskinError(
             f"{interpreter} is MicroPython {version}, but not a 32-bit build: its small integers and viper's "
-            "ptr32 differ from the RP2040's. Build it with MICROPY_FORCE_32BIT=1, or unset MICROPYTHON and "
-            "run `python tools/build_micropython.py`."
+            "ptr32 differ from the RP2040's. Build it with MICROPY_FORCE_32BIT=1, or unset MICROPYTHON: "
+            "then one is built where it is needed first."
         )
     return version
 
@@ -149,7 +149,9 @@ def build(folder: Path, checkout: Path | None, *, force: bool) -> None:
                 tag = None if checkout else f"v{VERSION}"  # a checkout describes itself
                 keep(compile_source(source, Path(name) / "build", runner, tag), folder)
     except (BubbleskinError, OSError) as problem:
-        raise BubbleskinError(f"MicroPython cannot be built here: {problem}\n{INSTEAD}") from problem
+        said = str(problem)
+        after = "\n" if "\n" in said else " "  # the end of a log keeps its lines
+        raise BubbleskinError(f"MicroPython cannot be built here: {said}{after}{INSTEAD}") from problem
 
 
 def micropython(checkout: Path | None = None, *, force: bool = False) -> Path:

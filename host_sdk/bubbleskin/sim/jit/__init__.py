@@ -4,6 +4,6 @@
 that they are; `BUBBLESKIN_JIT=check` runs them as plain Python that checks that no intermediate leaves 32 bits.
 """
 
-from bubbleskin.sim.jit.install import enable
+from bubbleskin.sim.jit.install import compile_module, enable, waiting
 
-__all__ = ["enable"]
+__all__ = ["compile_module", "enable", "waiting"]

@@ -42,6 +42,16 @@ def enable() -> None:
         install(held, function)
 
 
+def waiting() -> list[str]:
+    """The modules whose functions are compiled when one of them is called."""
+    return sorted(_held)
+
+
+def compile_module(module: str) -> None:
+    """Compile the functions of a module now, or load what was compiled before."""
+    _compile(module)
+
+
 def _check(held: FunctionType, function: FunctionType) -> None:
     function.__code__ = translate.checked_code(function)
     function.__kwdefaults__ = {"_whole": whole}

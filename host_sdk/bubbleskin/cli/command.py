@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from bubbleskin.cli import bench, device, firmware, flash, membrane, monitor, plan, play, plot, sim, store
+from bubbleskin.cli import bench, device, doctor, firmware, flash, membrane, monitor, plan, play, plot, sim, store
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 LOG = "BUBBLESKIN_LOG"
@@ -25,6 +25,7 @@ def bubbleskin() -> None:
 
 for _command in (
     *device.commands,
+    *doctor.commands,
     *play.commands,
     *plan.commands,
     *monitor.commands,
@@ -102,6 +103,7 @@ def _logging() -> Iterator[None]:
 
 
 def _end(sentence: str, status: int) -> None:
+    exec("")  # an interrupted `exec` of any library would make Python end by SIGINT after all; the next one undoes it
     click.echo(" ".join(sentence.split()), err=True)
     sys.exit(status)
 
