@@ -2,8 +2,8 @@
 """The law of the first release, in floats: what the present one is held against, on the same plants.
 
 It moved its metered air towards the air that the measured pressure meant by the table: at rest a loop over pressure. Of the
-pulses of that firmware and of this, 99.7 % were within 20 µs. One trim was of both valves, the pressure of the air around was taken
-for that at sea level. Of its faults only the two limits of each reading are here: such a bubble is vented, and counted.
+pulses of that firmware and of this, 99.7 % were within 20 µs. One trim was of both valves, the pressure of the air around was
+taken for that at sea level. Of its faults only the two limits of each reading are here: such a bubble is vented, and counted.
 Units: µm, Pa, µJ, µs, µJ/ms.
 """
 

@@ -12,7 +12,7 @@ from bubbleskin.bench.control.runs import HOLDS, LONG, SEARCH, STEP, TO_AND_FRO,
 from bubbleskin.bench.control.shows import TIMES_S
 from bubbleskin.bench.rows import Row, share_of
 
-_SHEETS = {HOLDS: 6, LONG: 4, TO_AND_FRO: 6, STEP: 12, SEARCH: 100}
+_SHEETS = {HOLDS: 4, LONG: 2, TO_AND_FRO: 4, STEP: 8, SEARCH: 100}
 """Of each kind at full size, a seed each."""
 LONG_GOAL_MM, TO_AND_FRO_GOAL_MM = 0.15, 0.20
 FILL_GOAL, OVERSHOOT_GOAL_MM = 1.5, 0.2
@@ -44,6 +44,10 @@ def _asked() -> Iterator[tuple[str, Kind, str]]:
         yield STEP, KINDS[0], contender
     for kind in KINDS:
         yield SEARCH, kind, PRESENT
+
+
+COUNT = len(list(_asked()))
+"""Of figures that there will be."""
 
 
 def rows(size: float = 1.0, seed: int = 1) -> Iterator[Row]:

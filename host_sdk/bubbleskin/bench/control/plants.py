@@ -2,8 +2,8 @@
 
 Every sheet is drawn by its seed: bubbles, valves and sensors as of `bubbleskin.sim.tolerances`. A calibration leaves errors of
 its own, drawn by the same seed: of the wall, of flows and dead times of either valve, of the zero. Nobody measures the sensor's
-gain or the volume of the line, so the plant is off by theirs. What trades with a flow (the supply's sensor, the restrictor's critical
-ratio) or cannot be seen at all (the neck) is nominal.
+gain or the volume of the line, so the plant is off by theirs. What trades with a flow (the supply's sensor, the restrictor's
+critical ratio) or cannot be seen at all (the neck) is nominal. Tables are of rubber as it was made; it has been stretched since.
 """
 
 from dataclasses import dataclass, replace
@@ -50,6 +50,8 @@ class Kind:
     lowest_mm: float = 5.5
     highest_mm: float = 13.0
     calibrated: bool = True
+    curve_sd: float | None = None
+    """What a calibration finds of how well a table says pressures; None is the board's, with the memory of rubber."""
     leak_known: bool = False
     warm: bool = False
     """Whether the calibration was made at the plant's temperature; else at 20 °C."""
@@ -62,7 +64,7 @@ def _real(**options: object) -> PlantOptions:
 
 
 KINDS = (
-    Kind("paper's sheet, ideal rubber", PlantOptions(), 0.05, 0.5),
+    Kind("paper's sheet, ideal rubber", PlantOptions(), 0.05, 0.5, curve_sd=0.01),
     Kind("real rubber", _real(), 0.12, 1.0),
     Kind("μ × 1.25, real rubber", _real(sheet="stiff25"), 0.20, 2.0, sheets=0.03),
     Kind("μ × 1.5, real rubber", _real(sheet="stiff50"), 0.20, 2.0, sheets=0.005),
@@ -142,6 +144,7 @@ def _trim(kind: Kind, p: PlantParameters, rng: np.random.Generator) -> tuple[Tri
         vent_closes_us=dead_us(p.vent_closing),
         vent_flow_gain=flow(p.vent_conductance),
         flow_sd=np.full(n, round(_FLOW_SD * _SHARE)),
+        curve_sd=None if kind.curve_sd is None else np.full(n, round(kind.curve_sd * _SHARE)),
         leak=np.rint(_LEAK_UNIT * p.leak).astype(int) if kind.leak_known else None,
     )
     return trim, offset - (zero - board.SENSOR_ZERO) * board.SENSOR_PA_PER_COUNT
