@@ -17,7 +17,7 @@ from bubbleskin.errors import BubbleskinError, InvalidInput
 
 _HELP = f"""Measure speeds, and how well heights are held, and print them beside their targets.
 
-PART: {", ".join(f"{name} ({what})" for name, what in BENCHES.items())}. Without one, all others.
+PART: {", ".join(f"{name} ({what})" for name, what in BENCHES.items())}. Without one, all but {", ".join(LONG)}.
 """
 _CONTROL = "control"
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from bubble_firmware.control.flow import flow_gain
 from bubble_firmware.control.state_layout import FOLLOW, VENT
 from bubble_firmware.control.supply import Supply
-from bubble_protocol.schema.settings import ATMOSPHERE_PA
 from bubbleskin import boards
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.bench.control.first_law import Bubbles, Figures
@@ -108,8 +107,7 @@ class Present(Contender):
         if sheet.tables and sheet.trim:
             skin.upload_tables(sheet.tables, anyway=True)
             skin.upload_trim(sheet.trim, anyway=True)
-        atmosphere = round(sheet.parameters.supply.atmosphere)
-        run_sync(skin.link.call("SETTING_WRITE", (), [(ATMOSPHERE_PA, atmosphere)]))
+        skin.configure(atmosphere_kpa=sheet.parameters.supply.atmosphere * 1e-3)
 
     def show(self, heights_mm: NDArray[np.float64]) -> None:
         """See `Contender`."""
