@@ -7,16 +7,18 @@ critical ratio) or cannot be seen at all (the neck) is nominal. Tables are of ru
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bubble_firmware.control.flow import flow_gain
+from bubble_firmware.control.table import pressure_top
 from bubbleskin import boards
 from bubbleskin.device.trim import Trim
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane import Table, YeohBalloon, build_table
+from bubbleskin.membrane.balloon import yeoh_pressure
 from bubbleskin.sim.parameters import PlantParameters, Supply
 from bubbleskin.sim.pneumatics import REFERENCE_TEMPERATURE, RESTRICTOR
 from bubbleskin.sim.recipe import PlantOptions, make_parameters
@@ -32,6 +34,11 @@ _LINE_SD = 0.01
 _SENSOR_SD = 0.005
 _ZERO_SD = 3.0  # Pa
 _SHARE = 65536  # of a trim's shares
+_WALLS = ("mu", "c2", "c3", "thickness", "radius")
+_STIFFEST = (
+    0.99  # of the pressure that the board's tables may have at its greatest height: a calibration adds its errors
+)
+_ATTEMPTS, _ATTEMPT_SEEDS = 100, 1_000_000
 _LEAK_UNIT = 16e9  # of a trim's leak in a m³/s per Pa
 
 
@@ -101,13 +108,13 @@ def sheet(kind: Kind, seed: int) -> Sheet:
     parameters = make_parameters(n, seed, SPREAD, **kind.plant)
     if not kind.calibrated:
         return Sheet(kind, seed, parameters, None, None)
-    walls = make_parameters(n, seed, kind.sheets, **kind.plant)
     rng = np.random.default_rng((seed, *b"calibration"))
     nominal = PlantParameters.nominal(n)
     supply = parameters.supply
+    walls: dict[str, Any] = _walls(kind, n, seed)
     parameters = replace(
         parameters,
-        **{name: getattr(walls, name) for name in ("mu", "c2", "c3", "thickness", "radius")},
+        **walls,
         sensor_gain=1.0 + rng.normal(0.0, _SENSOR_SD, n),
         node_volume=nominal.node_volume,
         tube_volume=nominal.tube_volume + (nominal.node_volume + nominal.tube_volume) * rng.normal(0.0, _LINE_SD, n),
@@ -118,6 +125,21 @@ def sheet(kind: Kind, seed: int) -> Sheet:
     )
     trim, rest = _trim(kind, parameters, rng)
     return Sheet(kind, seed, parameters, _tables(parameters, rest, rng), trim)
+
+
+def _walls(kind: Kind, n: int, seed: int) -> dict[str, NDArray[np.float64]]:
+    """Figures of walls and rubber; what is too stiff for the board's tables is drawn again."""
+    board = boards.load(BOARD)
+    walls: dict[str, NDArray[np.float64]] = {}
+    stiff = np.ones(n, bool)
+    for attempt in range(_ATTEMPTS):
+        drawn = make_parameters(n, seed + attempt * _ATTEMPT_SEEDS, kind.sheets, **kind.plant)
+        walls = {name: np.where(stiff, getattr(drawn, name), walls.get(name, 0.0)) for name in _WALLS}
+        pressure = yeoh_pressure(0.5e-6 * board.HEIGHT_MAX_UM / walls["radius"], **walls)
+        stiff = pressure > _STIFFEST * pressure_top(board)
+        if not stiff.any():
+            return walls
+    raise InvalidInput(f"{_ATTEMPTS} draws gave no sheet that {BOARD} can have of {kind.name}: it is too stiff.")
 
 
 def _trim(kind: Kind, p: PlantParameters, rng: np.random.Generator) -> tuple[Trim, NDArray[np.float64]]:
