@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import bubbleskin.bench
-from bubbleskin.bench import BENCHES, measure
+from bubbleskin.bench import BENCHES, LONG, measure
 from bubbleskin.cli.bench import bench
 
 pytestmark = pytest.mark.slow
@@ -17,7 +17,7 @@ SMALL = 0.005
 ON_THE_CHIP = {"rp2040", "trace", "float_law"}
 
 
-@pytest.mark.parametrize("name", BENCHES)
+@pytest.mark.parametrize("name", [name for name in BENCHES if name not in LONG])
 def test_a_bench_in_small(name, request):
     if name == "link":
         request.getfixturevalue("micropython")

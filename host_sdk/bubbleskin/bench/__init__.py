@@ -18,8 +18,13 @@ BENCHES: dict[str, str] = {
     "codec": "frames, beside pymavlink",
     "link": "round trips over a pseudo-terminal, beside a plain echo",
     "clock": "error of the device's time under jitter",
+    "control": "true heights on honest plants, beside those of the first law; some 15 minutes, so only where it is named",
 }
 """What runs on the host: the module's name, and what it measures in a few words."""
+
+
+LONG = ("control",)
+"""Those that run only where they are named."""
 
 
 def measure(bench: str, size: float = 1.0) -> Iterator[Row]:

