@@ -309,7 +309,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             # A pressure that no memory explains: the air is not what was metered.
             far = pressure - knot[_KNOT_PRESSURE] - (knot[_KNOT_PRESSURE] * (row[_CURVE_ERROR] >> 4) >> 12)
             most = _FAR_MOVING_PA if row[_STATUS] & 3 else _FAR_PA
-            if (most - far | most + far) >> 31 == 0 or row[_SUSPECT]:
+            if (most - far | most + far) >> 31 == 0 or row[_SUSPECT] | row[_EMPTY_TICKS]:
                 row[_FAR_TICKS] = 0
             elif row[_STATUS] & 3 and row[_FAR_TICKS] < _FAR_MAX:
                 row[_FAR_TICKS] = row[_FAR_TICKS] + 1
@@ -360,7 +360,11 @@ def restart(row: ptr32, board: ptr32):
             high = segment
             upwards = 1
             while (pressure - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - pressure) >> 31:
-                if high == row[_LAST_SEGMENT] and low == row[_FIRST_SEGMENT]:
+                if high == row[_LAST_SEGMENT] and low == row[_FIRST_SEGMENT]:  # nowhere
+                    segment = low
+                    if pressure > 0:
+                        segment = high
+                    knot = ptr32(uint(curves) + segment)
                     break
                 if (upwards and high != row[_LAST_SEGMENT]) or low == row[_FIRST_SEGMENT]:
                     upwards = 0
