@@ -53,6 +53,8 @@ def parse_heights(texts: Sequence[str]) -> NDArray[np.float64]:
     for position, text in enumerate(texts, 1):
         if re.match(r"--|-[a-z]", text, re.I):
             raise InvalidInput(f"There is no option {checks.shown(text)}; see --help.")
+        if text in SHAPES:
+            raise InvalidInput(f"{text!r} is no height in mm; the shape of that name is --shape {text}.")
         try:
             heights.append(table.number(Cell(text.strip(), 1, position)))
         except CellError as error:

@@ -19,6 +19,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from bubbleskin.checks import shown
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import parse_toml, read_text, write_text
 from bubbleskin.sim.parameters import RUBBERS, PlantParameters, Supply, allowed
@@ -47,7 +48,7 @@ def read(path: str | Path, n: int) -> PlantParameters:
             _unknown(path, name, "at its top", _SECTIONS)
     rubber = said.get("rubber", RUBBERS[0])
     if rubber not in RUBBERS:
-        raise InvalidInput(f"The plant {path} has rubber = {rubber!r}; choose one of {', '.join(RUBBERS)}.")
+        raise InvalidInput(f"The plant {path} has rubber = {shown(rubber)}; choose one of {', '.join(RUBBERS)}.")
     supply = _section(path, said, "supply", [f.name for f in fields(Supply)])
     bubbles = _section(path, said, "bubbles", PlantParameters.each())
     nominal = PlantParameters.nominal(n)
@@ -77,7 +78,7 @@ def _text(value: float) -> str:
 def _unknown(path: str | Path, name: str, where: str, known: Any) -> NoReturn:
     near = get_close_matches(name, known, 1)
     may = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
-    raise InvalidInput(f"The plant {path} has {name!r} {where}, which nothing there is called; {may}")
+    raise InvalidInput(f"The plant {path} has {shown(name)} {where}, which nothing there is called; {may}")
 
 
 def _numbers(path: str | Path, name: str, value: Any, n: int) -> np.ndarray:
@@ -92,8 +93,8 @@ def _numbers(path: str | Path, name: str, value: Any, n: int) -> np.ndarray:
 
 def _number(path: str | Path, name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidInput(f"The plant {path} has {name} = {value!r}, which is not a number.")
+        raise InvalidInput(f"The plant {path} has {name} = {shown(value)}, which is not a number.")
     may = allowed(name, value)
     if may:
-        raise InvalidInput(f"The plant {path} has {name} = {value}; give {may}.")
+        raise InvalidInput(f"The plant {path} has {name} = {shown(value)}; give {may}.")
     return float(value)
