@@ -33,7 +33,7 @@ def test_every_kind_has_sheets_that_every_contender_takes(kind, contender):
     one = CONTENDERS[contender](sheet(kind, 7))
     told = hold(one, np.full(7, 6.5), 0.6)
     assert told.true.shape == told.told.shape == (1, 7)
-    assert np.abs(told.true - 6.5).min() < 0.5  # how many of them are there is what the bench measures
+    assert told.true.max() > 6.0  # how well they are there is what the bench measures
 
 
 def test_a_sheet_is_its_seed():

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from bubbleskin.bench import BENCHES, LONG, measure
 from bubbleskin.bench.rows import Row
-from bubbleskin.cli.options import as_json, gathered
+from bubbleskin.cli.options import SEED, Real, as_json, gathered
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 _HELP = f"""Measure speeds, and how well heights are held, and print them beside their targets.
@@ -42,12 +42,12 @@ class OfControl(NamedTuple):
 )
 @click.option(
     "--size",
-    type=click.FloatRange(0, 1, min_open=True),
+    type=Real(0.0, 1.0, above_zero=True),
     default=1.0,
     show_default=True,
     help="control: the share of its sheets.",
 )
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="control: of its first sheet.")
+@click.option("--seed", type=SEED, default=1, show_default=True, help="control: of its first sheet.")
 @click.option("--write", is_flag=True, help="control: write its figures into docs/control.md of this folder.")
 @click.option("--check", is_flag=True, help="control: measure nothing; fail if that page does not show those figures.")
 @as_json
