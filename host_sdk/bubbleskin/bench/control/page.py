@@ -65,7 +65,10 @@ def _rounded(value: Any) -> Any:
 def _tables(entries: Sequence[_Entry]) -> str:
     found = {(one["use"], one["plant"], one["contender"]): one for one in entries}
     times = " / ".join(f"{moment:g}" for moment in TIMES_S)
+    held = next((one["shows"] for one in entries if one["use"] == HOLDS), 0)
     lines = [
+        f"Shows of seven bubbles that were held, of each kind: {held}.",
+        "",
         f"| plant | goal: mm; pulses/s | RMS at {times} s, mm | most, mm | pulses/s | within 2 sd | settled | of these wrong "
         f"| first law: RMS at {times} s, mm | pulses/s | settled wrong |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
