@@ -318,7 +318,7 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                         watch[_CLOSED_TICKS] = 0
                 watch[_CLOSED_TICKS] = watch[_CLOSED_TICKS] + 1
                 change = pressure - watch[_CLOSED_PA]
-                within = _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> 6)
+                within = _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> 4)
                 if change > within or change < 0 - within:
                     watch[_CLOSED_OFF_TICKS] = watch[_CLOSED_OFF_TICKS] + 1
                     if watch[_CLOSED_OFF_TICKS] >= _READINGS_MIN:
