@@ -102,7 +102,7 @@ _BUDGET = const(128)
 
 _DEFICIT_MAX = const(80000)  # µJ
 _SURPLUS_MAX = const(90000)
-_CLOSED_WITHIN_PA = const(700)  # a closed line keeps its pressure within, and within 1/64 of it: its neighbours move
+_CLOSED_WITHIN_PA = const(700)  # a closed line keeps its pressure within, and within 1/16 of it: rubber creeps, neighbours move
 _INFLATED_PA = const(8000)  # which 4 mJ bring about
 _FLAT_MAX = const(12000)  # µJ
 _DROP_PA = const(10000)
