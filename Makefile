@@ -11,7 +11,7 @@ UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz hostile generate lock clean
+.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz hostile leaks readers generate lock clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -84,6 +84,12 @@ fuzz: setup ## look for bytes that harm the firmware, ten minutes; keeps what it
 
 hostile: setup micropython ## 100,000 requests that nobody should send, for each board on MicroPython, three minutes
 	$(BIN)/python tools/stress/hostile.py
+
+leaks: setup micropython ## 500 connections to each target and 100,000 states: what is left of them; eight minutes
+	$(BIN)/python tools/stress/leaks.py
+
+readers: setup ## 100,000 files that are none, for every reader; six minutes
+	$(BIN)/python tools/stress/readers.py
 
 bench: setup ## measure speeds
 	$(BIN)/bubbleskin bench

@@ -253,6 +253,7 @@ def test_what_a_file_leaves_out_is_nominal_and_one_number_is_for_all(tmp_path):
         ("[supply]\nviscosity = 3", "has 'viscosity' in [supply], which nothing there is called; "),
         ("[bubbles]\nmu = [1.0, 2.0]", "has 2 numbers for mu; give 7, one for each bubble, or one for all."),
         ('[bubbles]\nmu = "soft"', "has mu = 'soft', which is not a number."),
+        (f"[bubbles]\nmu = {10**400}", "a finite number"),
         ("[bubbles]\nmu = true", "has mu = True, which is not a number."),
         ("[bubbles]\nmu = -1.0", "has mu = -1.0; give a finite number, more than 0."),
         ("[bubbles]\nleak = -1.0", "has leak = -1.0; give a finite number, 0 or more."),

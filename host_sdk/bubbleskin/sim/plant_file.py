@@ -12,6 +12,7 @@ TOML, all in SI units and by the names of `PlantParameters` and `Supply`:
 What a file leaves out is nominal. `write` leaves out nothing, and `read` of what it wrote is the same to the last bit.
 """
 
+import math
 from dataclasses import asdict, fields
 from difflib import get_close_matches
 from pathlib import Path
@@ -94,7 +95,11 @@ def _numbers(path: str | Path, name: str, value: Any, n: int) -> np.ndarray:
 def _number(path: str | Path, name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidInput(f"The plant {path} has {name} = {shown(value)}, which is not a number.")
-    may = allowed(name, value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    may = allowed(name, number)
     if may:
         raise InvalidInput(f"The plant {path} has {name} = {shown(value)}; give {may}.")
-    return float(value)
+    return number
