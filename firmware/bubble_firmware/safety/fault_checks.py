@@ -102,7 +102,7 @@ _BUDGET = const(128)
 
 _DEFICIT_MAX = const(80000)  # µJ
 _SURPLUS_MAX = const(90000)
-_CLOSED_WITHIN_PA = const(700)  # a closed line keeps its pressure within, and within 1/16 of it: rubber creeps, neighbours move
+_CLOSED_WITHIN_PA = const(700)  # a closed line keeps its pressure within, and a share of it: neighbours move
 _INFLATED_PA = const(8000)  # which 4 mJ bring about
 _FLAT_MAX = const(12000)  # µJ
 _DROP_PA = const(10000)
@@ -173,9 +173,12 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
                 if pressure < _VENTED_PA and faults == 0:
                     watch[_INFLOW] = 0
             elif row[_LOST_TICKS] == 0:
-                # On its plateau a soft bubble empties without losing pressure. One that had the air that is left would have less.
+                # On its plateau a soft bubble empties without losing pressure: one that had the air that is left would have less.
                 knot = ptr32(uint(curves) + row[_HEIGHT_SEGMENT])
-                if pressure > knot[_KNOT_PRESSURE] and pressure > knot[_KNOT_WORDS + _KNOT_PRESSURE]:
+                least = knot[_KNOT_PRESSURE]
+                if least < knot[_KNOT_WORDS + _KNOT_PRESSURE]:
+                    least = knot[_KNOT_WORDS + _KNOT_PRESSURE]
+                if pressure > least or pressure > _OVERFILLED_PA:
                     watch[_STALL_TICKS] = watch[_STALL_TICKS] + 1
                     if pressure > watch[_STALL_PA] + _STALL_FALL_PA:
                         watch[_INFLOW] = 1
@@ -318,8 +321,10 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                         watch[_CLOSED_TICKS] = 0
                 watch[_CLOSED_TICKS] = watch[_CLOSED_TICKS] + 1
                 change = pressure - watch[_CLOSED_PA]
-                within = _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> 4)
-                if change > within or change < 0 - within:
+                # Filled quickly, rubber relaxes: it may lose more than it may gain.
+                if change > _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> 6) or change < 0 - _CLOSED_WITHIN_PA - (
+                    watch[_CLOSED_PA] >> 4
+                ):
                     watch[_CLOSED_OFF_TICKS] = watch[_CLOSED_OFF_TICKS] + 1
                     if watch[_CLOSED_OFF_TICKS] >= _READINGS_MIN:
                         if change < 0:
