@@ -106,6 +106,7 @@ def fills_on(app):
             opened.append(True)
         if opened:
             pulses[0], pulses[1] = tick_us, 0
+            app.bubbles.clear_faults(0)
         return 0
 
     app.fault_monitor.check = check

@@ -322,7 +322,7 @@ def test_a_served_board_takes_shapes_in_real_time(served):
         states.close()
         assert np.diff(times) == pytest.approx(0.02)
         skin.vent()
-    assert served.board.height_mm.max() < 13
+    assert served.board.alone_mm.max() < 13
     with bs.connect(served.name) as again:
         assert again.state().mode in ("venting", "idle")
 

@@ -176,12 +176,13 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
                 # On its plateau a soft bubble empties without losing pressure: one that had the air that is left would have less.
                 knot = ptr32(uint(curves) + row[_HEIGHT_SEGMENT])
                 least = knot[_KNOT_PRESSURE]
-                if least < knot[_KNOT_WORDS + _KNOT_PRESSURE]:
+                if least > knot[_KNOT_WORDS + _KNOT_PRESSURE]:
                     least = knot[_KNOT_WORDS + _KNOT_PRESSURE]
+                if pressure > watch[_STALL_PA] + _STALL_FALL_PA:
+                    watch[_INFLOW] = 1
+                    least = 0
                 if pressure > least or pressure > _OVERFILLED_PA:
                     watch[_STALL_TICKS] = watch[_STALL_TICKS] + 1
-                    if pressure > watch[_STALL_PA] + _STALL_FALL_PA:
-                        watch[_INFLOW] = 1
                     if watch[_STALL_TICKS] >= limits[_STALL_MAX]:
                         faults |= _VALVE_STUCK
                         if watch[_INFLOW] and pressure > _OVERFILLED_PA:
