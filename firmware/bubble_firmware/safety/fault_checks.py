@@ -324,7 +324,7 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                 change = pressure - watch[_CLOSED_PA]
                 # Filled quickly, rubber relaxes: it may lose more than it may gain.
                 if change > _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> 6) or change < 0 - _CLOSED_WITHIN_PA - (
-                    watch[_CLOSED_PA] >> 4
+                    watch[_CLOSED_PA] >> 5
                 ):
                     watch[_CLOSED_OFF_TICKS] = watch[_CLOSED_OFF_TICKS] + 1
                     if watch[_CLOSED_OFF_TICKS] >= _READINGS_MIN:
