@@ -6,6 +6,7 @@ from array import array
 import numpy as np
 import pytest
 
+import bubble_firmware.control.state_layout as layout
 from bubble_firmware import boards
 from bubble_firmware.device_clock import LATEST, ticks_add, ticks_diff
 from bubble_protocol import steps
@@ -177,3 +178,29 @@ def test_an_isolation_of_months_is_over_when_it_is_acknowledged(rig7):
     rig7.app.clock.ticks = LATEST // 4 * 3
     assert rig7.ask("CLEAR")["isolated_ms"] == 0
     assert not rig7.app.bubbles.faults(0)
+
+
+def held(left):
+    """Pulses of leaking bubbles that are held for 3 s, where control's own count of ticks ends `left` ticks after boot."""
+    firmware = InProcessFirmware(BOARD, BOOT_ID)
+    bubbles = firmware.app.bubbles
+    bubbles.state[layout.TICK] = before = LATEST - left
+    for bubble in range(BOARD.BUBBLES):
+        for word in (layout.REFERENCE_TICK, layout.LEAK_TICK):
+            bubbles.rows[bubble * layout.ROW_WORDS + word] = before
+        bubbles.rows[bubble * layout.ROW_WORDS + layout.LEAK_RATE] = 800
+    board = SimulatedBoard(seed=4, firmware=firmware, contact=False, rubber="real", leak=0.01)
+    decided = []
+    for tick in range(3_000_000 // BOARD.TICK_US):
+        if tick == 20:
+            firmware.app.commands.show(array("i", range(7000, 10500, 500)), 0, 1)
+        firmware.app.deadman.host_activity()
+        board.tick()
+        decided.append(list(bubbles.pulses))
+        assert bubbles.state[layout.TICK] <= LATEST, "no interpreter's words are left"
+    return decided
+
+
+@pytest.mark.parametrize("left", [0, 100, 300, 500])
+def test_heights_are_held_across_the_end_of_controls_time(left):
+    assert held(left) == held(LATEST // 2)

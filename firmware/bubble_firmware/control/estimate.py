@@ -16,6 +16,7 @@ from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
 # [constants] bubble_firmware.control.state_layout: used
 # [constants] bubble_protocol.schema.faults: used
 # [constants] bubble_firmware.hal.base: ABSENT
+# [constants] bubble_firmware.device_clock: LATEST
 _SENSOR_ZERO = const(0)
 _FILL_OPENS_US = const(1)
 _FILL_CLOSES_US = const(2)
@@ -96,6 +97,7 @@ _ROOT_END = const(8191)
 _OVERPRESSURE = const(1)
 _SENSOR_LOST = const(2)
 _ABSENT = const(65535)
+_LATEST = const(1073741823)
 # [end of constants]
 
 _AIR_MAX = const(400000)  # µJ, more than any bubble of 16 mm holds: keeps every product of control within 32 bits
@@ -121,7 +123,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
     atmosphere = board[_ATMOSPHERE_PA]
     same = 1 if mode == board[_CONTROL_MODE] else 0
     board[_CONTROL_MODE] = mode
-    board[_TICK] = board[_TICK] + 1
+    board[_TICK] = board[_TICK] + 1 & _LATEST
     supply_scale = supply + atmosphere >> 3  # 8 Pa
     supply_reciprocal = 0x3FFFFFFF // (supply + atmosphere)
     chosen = 0
@@ -248,7 +250,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
             row[_AIR_IN_FLIGHT] = in_flight
             if row[_LEAK_RATE]:
                 # Pa/16 times µJ/s per kPa *16, ticks: µJ/s/1000 ticks.
-                leaked = row[_LEAKED] + (pressure >> 4) * row[_LEAK_RATE] * (board[_TICK] - row[_LEAK_TICK])
+                leaked = row[_LEAKED] + (pressure >> 4) * row[_LEAK_RATE] * (board[_TICK] - row[_LEAK_TICK] & _LATEST)
                 lost = leaked // board[_LEAK_SHARE]
                 row[_LEAKED] = leaked - lost * board[_LEAK_SHARE]
                 metered -= lost

@@ -16,6 +16,7 @@ worse than thought: they are doubled, until pressure and air agree.
 from bubble_protocol.mpy_compat import const, micropython, ptr32, uint
 
 # [constants] bubble_firmware.control.state_layout: used
+# [constants] bubble_firmware.device_clock: LATEST
 _CURVE_SD = const(8)
 _AIR = const(16)
 _HEIGHT = const(26)
@@ -50,6 +51,7 @@ _ATMOSPHERE_PA = const(23)
 _ROWS = const(157)
 _READINGS_BITS_FIRST = const(3)
 _AIR_SD_MAX = const(60000)
+_LATEST = const(1073741823)
 # [end of constants]
 
 _DWELL_UM = const(100)  # a bubble that has moved further dwells somewhere else
@@ -135,7 +137,7 @@ def compare(row: ptr32, board: ptr32, bubble: int) -> int:
         ratio = -2048
     row[_PRESSURE_RATIO] = row[_PRESSURE_RATIO] + (ratio - row[_PRESSURE_RATIO] >> 2)
     moved = (height >> 4) - row[_DWELL_HEIGHT]
-    if moved > _DWELL_UM or moved < 0 - _DWELL_UM or board[_TICK] - row[_REFERENCE_TICK] >= board[_SECOND]:
+    if moved > _DWELL_UM or moved < 0 - _DWELL_UM or board[_TICK] - row[_REFERENCE_TICK] & _LATEST >= board[_SECOND]:
         return 1
     return 0
 
@@ -149,7 +151,7 @@ def fade(row: ptr32, board: ptr32, bubble: int):
     second = board[_SECOND]
 
     # The peak fades within 20 s.
-    elapsed = board[_TICK] - row[_REFERENCE_TICK]
+    elapsed = board[_TICK] - row[_REFERENCE_TICK] & _LATEST
     if elapsed > 20 * second:
         elapsed = 20 * second
     row[_PEAK] = row[_PEAK] - (row[_PEAK] - height) * elapsed // (20 * second)
@@ -241,7 +243,7 @@ def correct(row: ptr32, board: ptr32, bubble: int):
     # Beyond four standard deviations both are worse than thought. The next mean is asked then, and where a step is not enough.
     doubted = 1 if (r >> 2) * (r >> 2) > v else 0
     if doubted or r > _INNOVATION_MAX or r < 0 - _INNOVATION_MAX:
-        row[_REFERENCE_TICK] = board[_TICK] - board[_SECOND]
+        row[_REFERENCE_TICK] = board[_TICK] - board[_SECOND] & _LATEST
         row[_READINGS_BITS] = _READINGS_BITS_FIRST
     if r > _INNOVATION_MAX:
         r = _INNOVATION_MAX
