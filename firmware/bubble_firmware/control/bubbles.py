@@ -86,30 +86,17 @@ _WHOLE_WAY = const(32768)  # in the shares of `advance`
 
 
 @micropython.viper
-def _pack_state(row: ptr32, values: ptr32, at: int, n: int):  # type: ignore[no-untyped-def]
-    """Copy what STATE and TELEMETRY say of every bubble to `values[at:]`, in the schema's order."""
+def _pack(row: ptr32, values: ptr32, at: int, fields: int, n: int):  # type: ignore[no-untyped-def]
+    """Copy what is said of every bubble to `values[at:]`: the five fields of STATE and TELEMETRY, or the six of ESTIMATE."""
     while n > 0:
         values[at] = row[_HEIGHT] >> 4
         values[at + 1] = row[_PRESSURE]
         values[at + 2] = row[_TARGET]
         values[at + 3] = row[_STATUS]
         values[at + 4] = row[_FAULTS]
-        at += 5
-        row = ptr32(uint(row) + 4 * _ROW_WORDS)
-        n -= 1
-
-
-@micropython.viper
-def _pack_estimate(row: ptr32, values: ptr32, at: int, n: int):  # type: ignore[no-untyped-def]
-    """Copy what ESTIMATE says of every bubble to `values[at:]`, in the schema's order."""
-    while n > 0:
-        values[at] = row[_HEIGHT] >> 4
-        values[at + 1] = row[_PRESSURE]
-        values[at + 2] = row[_TARGET]
-        values[at + 3] = row[_STATUS]
-        values[at + 4] = row[_FAULTS]
-        values[at + 5] = row[_HEIGHT_SD]
-        at += 6
+        if fields > 5:
+            values[at + 5] = row[_HEIGHT_SD]
+        at += fields
         row = ptr32(uint(row) + 4 * _ROW_WORDS)
         n -= 1
 
@@ -308,12 +295,12 @@ class Bubbles:
 
     def pack_state(self, values: "Words", at: int) -> None:
         """Put the repeated fields of STATE at `values[at:]`."""
-        _pack_state(self.rows, values, at, self.count)
+        _pack(self.rows, values, at, 5, self.count)
 
     def pack_estimate(self, values: "Words", at: int) -> None:
         """Put the repeated fields of ESTIMATE at `values[at:]`."""
         deviations(self.rows, self.state)
-        _pack_estimate(self.rows, values, at, self.count)
+        _pack(self.rows, values, at, 6, self.count)
 
     def pack_fields(self, values: "Words", plan: "Words", at: int, columns: int) -> int:
         """Put chosen words of every bubble's row at `values[at:]`; returns how many.
