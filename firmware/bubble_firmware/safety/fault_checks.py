@@ -323,9 +323,8 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                 watch[_CLOSED_TICKS] = watch[_CLOSED_TICKS] + 1
                 change = pressure - watch[_CLOSED_PA]
                 # Filled quickly, rubber relaxes: it may lose more than it may gain.
-                if change > _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> 6) or change < 0 - _CLOSED_WITHIN_PA - (
-                    watch[_CLOSED_PA] >> 5
-                ):
+                within = _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> (5 if change < 0 else 6))
+                if change > within or change < 0 - within:
                     watch[_CLOSED_OFF_TICKS] = watch[_CLOSED_OFF_TICKS] + 1
                     if watch[_CLOSED_OFF_TICKS] >= _READINGS_MIN:
                         if change < 0:
