@@ -68,7 +68,7 @@ TABLES = {
 
 @pytest.mark.parametrize("name", TABLES)
 def test_a_curve_says_of_the_table_what_a_sphere_holds(name):
-    """Volume in 1/64 mm³ and its slope per µm, from 5 to 14 mm, against floats and the exact segment."""
+    """Volume and its slope per µm, from 5 to 14 mm, against floats and the exact segment."""
     made = TABLES[name]
     _, knots = bubbles_with(list(zip(made.height_um, made.pressure_pa, strict=True)))
     h = knots[:, layout.KNOT_HEIGHT] / 16
