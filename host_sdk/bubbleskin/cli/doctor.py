@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bubbleskin import native
-from bubbleskin.cli.options import as_json, progress
+from bubbleskin.cli.options import as_json, progress_of_parts
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.warm import parts
 
@@ -57,13 +56,7 @@ def _warmed(console: Console) -> dict[str, float]:
     """Compile everything; the seconds that each part took."""
     native.expect_compiling()
     seconds = {}
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with progress(console, *columns) as bar:
+    with progress_of_parts(console) as bar:
         task = bar.add_task("compiling …")
         all_parts = parts()
         for done, part in enumerate(all_parts):

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-from bubbleskin.cli.options import Board, as_json, progress
+from bubbleskin.cli.options import Board, as_json, progress_of_parts
 from bubbleskin.errors import InvalidInput
 
 
@@ -52,13 +51,7 @@ def flash(
             f"{device} is simulated: it always runs the firmware of this source. Name a wristband's port."
         )
     console = Console(stderr=json)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with progress(console, *columns) as bar:
+    with progress_of_parts(console) as bar:
         task = bar.add_task("looking for the wristband")
 
         def report(title: str, done: int, total: int) -> None:

@@ -68,22 +68,16 @@ def _options(*options: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
+def _above_zero(flag: str, high: float, unit: str, default: float, help_text: str) -> Callable[[F], F]:
+    """An option for a number above zero, up to `high`."""
+    kind = Real(above_zero=True, high=high, unit=unit)
+    return click.option(flag, type=kind, default=default, show_default=True, help=help_text)
+
+
 size_options = _options(
     click.option("--wall", type=click.Choice(["thin", "thick"]), default="thin", show_default=True),
-    click.option(
-        "--thickness-mm",
-        type=Real(above_zero=True, high=100.0, unit="mm"),
-        default=1.0,
-        show_default=True,
-        help="Wall at rest.",
-    ),
-    click.option(
-        "--diameter-mm",
-        type=Real(above_zero=True, high=1000.0, unit="mm"),
-        default=5.0,
-        show_default=True,
-        help="Diameter at rest.",
-    ),
+    _above_zero("--thickness-mm", 100.0, "mm", 1.0, "Wall at rest."),
+    _above_zero("--diameter-mm", 1000.0, "mm", 5.0, "Diameter at rest."),
     click.option(
         "--diameter-is",
         type=click.Choice(["mid", "inner", "outer"]),
@@ -94,20 +88,8 @@ size_options = _options(
 )
 fit_options = _options(
     size_options,
-    click.option(
-        "--height-noise-mm",
-        type=Real(above_zero=True, high=100.0, unit="mm"),
-        default=0.05,
-        show_default=True,
-        help="One sigma.",
-    ),
-    click.option(
-        "--pressure-noise-kpa",
-        type=Real(above_zero=True, high=1000.0, unit="kPa"),
-        default=0.15,
-        show_default=True,
-        help="One sigma.",
-    ),
+    _above_zero("--height-noise-mm", 100.0, "mm", 0.05, "One sigma."),
+    _above_zero("--pressure-noise-kpa", 1000.0, "kPa", 0.15, "One sigma."),
     click.option("--pooled", is_flag=True, help="One curve through all bubbles of the file."),
     click.option("--skip-bad-rows", is_flag=True, help="Leave bad rows out and name them."),
     click.option(

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.progress import Progress, ProgressColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
 
 from bubbleskin import boards, checks
 from bubbleskin.errors import InvalidInput
@@ -80,6 +80,12 @@ LOOPS = Whole(0, TIMES_MAX)
 def progress(console: Console, *columns: ProgressColumn) -> Progress:
     """Bars that go away: for who looks at a terminal, and no line of a file that keeps what was said."""
     return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
+def progress_of_parts(console: Console) -> Progress:
+    """`progress` for work of a known number of parts: what is done now, how much of all is done, and the time."""
+    percent = TextColumn("{task.percentage:3.0f} %")
+    return progress(console, TextColumn("{task.description}"), BarColumn(), percent, TimeElapsedColumn())
 
 
 device = click.option(
