@@ -307,14 +307,15 @@ class AsyncSkin:
         checks.instance("trim", trim, Trim, "a Trim, such as dataclasses.replace(skin.trim(), zero=…)")
         checks.flag("save", save)
         checks.flag("anyway", anyway)
-        rows = trim.rows(self.info.bubbles)
+        own = self.info.tells_sd
+        rows = trim.rows(await self.trim()) if own else trim.short_rows(self.info.bubbles)
         if not anyway:
             check_trim(trim)
-        if self.info.tells_sd:
+        if own:
             for first in range(0, len(rows), ROWS_MOST):
                 await self.link.call("CALIBRATION_WRITE", (first,), rows[first : first + ROWS_MOST])
         else:
-            await self.link.call("TRIM_WRITE", (), trim.short_rows(self.info.bubbles))
+            await self.link.call("TRIM_WRITE", (), rows)
         if save:
             await self.save()
 

@@ -69,6 +69,19 @@ def test_a_trim_that_contradicts_itself_is_refused(skin):
     assert np.array_equal(skin.trim().flow_gain, trim.flow_gain)
 
 
+def test_what_a_trim_leaves_out(skin):
+    """The vent valve's figures are the fill valve's then; how well flows and tables are known, and the leak, stay."""
+    before = skin.trim()
+    told = np.arange(100, 107)
+    skin.upload_trim(dataclasses.replace(before, flow_sd=told, leak=told + 5, vent_opens_us=before.opens_us + 40))
+    skin.upload_trim(bs.Trim(before.zero, before.opens_us + 7, before.closes_us, before.flow_gain))
+    now = skin.trim()
+    assert np.array_equal(now.vent_opens_us, before.opens_us + 7)
+    assert np.array_equal(now.vent_flow_gain, before.flow_gain)
+    assert np.array_equal(now.curve_sd, before.curve_sd)
+    assert (now.flow_sd.tolist(), now.leak.tolist()) == (told.tolist(), (told + 5).tolist())
+
+
 def test_a_flow_that_no_restrictor_has_is_refused_by_the_device(skin):
     trim = skin.trim()
     with pytest.raises(bs.DeviceRefused, match=r"fill_gain .* is allowed"):

@@ -20,6 +20,7 @@ _Integers = NDArray[np.int64]
 _WIRE = codec.BY_NAME["CALIBRATION_WRITE"]
 ROWS_MOST = (frame.PAYLOAD_MAX - _WIRE.fixed_size) // _WIRE.stride
 """How many bubbles one message has room for."""
+_VENT = "vent_"  # before the names of what the vent valve has apart
 _SHORT = ("zero", "opens_us", "closes_us", "flow_gain")  # what older firmware knows: both valves alike
 _NAMES = {  # of the wire's fields
     "fill_opens_us": "opens_us",
@@ -27,14 +28,13 @@ _NAMES = {  # of the wire's fields
     "fill_gain": "flow_gain",
     "vent_gain": "vent_flow_gain",
 }
-_UNKNOWN = {"flow_sd": 3900, "curve_sd": 6554, "leak": 0}  # 6 %, 10 %, none
 
 
 @dataclass(frozen=True, eq=False)
 class Trim:
     """What sets each bubble apart besides its table, (n,) each, whole numbers as the firmware has them.
 
-    What is None is as of the fill valve, or as of a bubble that has not been calibrated.
+    Where a figure of the vent valve is None, it is as that of the fill valve; what else is None stays what the wristband has.
     """
 
     zero: _Integers
@@ -68,21 +68,28 @@ class Trim:
         names = replies[0].columns
         return cls(**{_NAMES.get(name, name): np.concatenate([r.columns[name] for r in replies]) for name in names})
 
-    def rows(self, bubbles: int) -> list[tuple[int, ...]]:
-        """One row per bubble, as CALIBRATION_WRITE wants them; `InvalidInput` where that cannot be."""
-        return self._rows(bubbles, tuple(field.name for field in fields(self)))
+    def rows(self, now: Self) -> list[tuple[int, ...]]:
+        """One row per bubble, as CALIBRATION_WRITE wants them, for a wristband that has the trim `now`.
+
+        `InvalidInput` where that cannot be.
+        """
+        return self._rows(len(now.zero), [(field.name, self._or(field.name, now)) for field in fields(self)])
 
     def short_rows(self, bubbles: int) -> list[tuple[int, ...]]:
         """One row per bubble, as TRIM_WRITE wants them: what sets its valves apart from each other is left out."""
-        return self._rows(bubbles, _SHORT)
+        return self._rows(bubbles, [(name, getattr(self, name)) for name in _SHORT])
 
-    def _rows(self, bubbles: int, names: Sequence[str]) -> list[tuple[int, ...]]:
+    def _or(self, name: str, now: Self) -> _Integers:
+        values: _Integers | None = getattr(self, name)
+        if values is not None:
+            return values
+        other: _Integers = getattr(self, name[len(_VENT) :]) if name.startswith(_VENT) else getattr(now, name)
+        return other
+
+    def _rows(self, bubbles: int, given: Sequence[tuple[str, _Integers]]) -> list[tuple[int, ...]]:
         rows = []
-        for name in names:
-            values = getattr(self, name)
-            if values is None:
-                values = np.full(bubbles, _UNKNOWN[name]) if name in _UNKNOWN else getattr(self, name[len("vent_") :])
-            values = finite(name, values)
+        for name, numbers in given:
+            values = finite(name, numbers)
             if values.shape != (bubbles,):
                 raise InvalidInput(
                     f"{name} has the shape {values.shape}; give one number for each of {bubbles} bubbles."

@@ -195,8 +195,9 @@ def _figures(sheet: Sheet, board: Any) -> list[Figures]:
         nominal = Figures(board.SENSOR_ZERO, board.VALVE_OPENS_US, board.VALVE_CLOSES_US, flow_gain(board), knots)
         return [nominal] * board.BUBBLES
     trim = sheet.trim
-    both = np.array(trim.rows(board.BUBBLES))[:, 1:7].reshape(-1, 2, 3)
-    opens, closes, flow = both.mean(axis=1).T
+    fill = np.array([trim.opens_us, trim.closes_us, trim.flow_gain])
+    vent = np.array([trim.vent_opens_us, trim.vent_closes_us, trim.vent_flow_gain])
+    opens, closes, flow = (fill + vent) / 2
     rows = zip(trim.zero, opens, closes, flow, map(_knots, sheet.tables), strict=True)
     return [Figures(*row) for row in rows]
 
