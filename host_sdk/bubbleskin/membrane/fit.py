@@ -29,7 +29,7 @@ LACK_OF_FIT_LEVEL = 0.01
 
 
 OUTLIERS_LIMIT = 0.2
-"""Share of the points: up to here the start of the fit is near the curve, whatever the outliers are."""
+"""Share of the points that is worth a warning; up to twice as many do not spoil the fit."""
 STIFFNESS = (3e3, 5e6)
 """Shear moduli (Pa) of silicone rubbers, from the softest gels to hard ones."""
 

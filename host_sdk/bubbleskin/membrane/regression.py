@@ -9,6 +9,7 @@ around a start that a fifth of the points cannot spoil (an MM estimate, Yohai 19
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,6 +25,8 @@ LOST = 6e-5
 """Share of good points that is taken for outliers: with many points those beyond 4 standard deviations."""
 PASSES = 60
 """Of the iteration, at most."""
+SUBSETS = 500
+"""Threes of points that are tried: with four of ten points wrong, one of five threes is good."""
 LEAST_CHANGE = 1e-7
 """Relative, of θ: a smaller one ends the passes."""
 
@@ -134,6 +137,29 @@ def start(dimensions: Dimensions, points: Points) -> np.ndarray:
     return theta * ratio
 
 
+def least_median(dimensions: Dimensions, points: Points, theta: np.ndarray) -> np.ndarray:
+    """Of curves through three points each, and ``theta``, the one whose median distance from all points is least.
+
+    Rousseeuw's least median of squares: up to half of the points may be anything. A point of each third of the heights, so
+    that the three say something of all constants; drawn by a generator of its own, so that the same points give the same curve.
+    """
+    third = len(points) // 3
+    if third < 2:
+        return theta
+    order, chance = np.argsort(points.height, kind="stable"), np.random.default_rng(0)
+    parts = (order[:third], order[third : 2 * third], order[2 * third :])
+    rows = np.stack([chance.choice(part, SUBSETS) for part in parts], axis=1)
+    basis, slopes = dimensions.basis(dimensions.at_least(points.height))
+    unit = np.abs(basis).mean(axis=0)
+    design = basis / unit
+    solvable = np.linalg.cond(design[rows]) < 1e6
+    found = np.linalg.solve(design[rows[solvable]], points.pressure[rows[solvable], None])[:, :, 0] / unit
+    thetas = np.vstack([theta, found[(found[:, 0] > 100) & (found[:, 2] >= 0)]])
+    sd = np.hypot(points.pressure_sd, (slopes @ thetas.T).T * points.height_sd)
+    distances = np.abs(points.pressure - thetas @ basis.T) / sd
+    return np.asarray(thetas[np.argmin(np.median(distances, axis=1))])
+
+
 def project(dimensions: Dimensions, points: Points, theta: np.ndarray, eta: np.ndarray) -> np.ndarray:
     """The place on the curve nearest to each point, from the guess ``eta``, in heights (m).
 
@@ -161,6 +187,8 @@ def solve_bounded(linear: Linear, weights: np.ndarray) -> np.ndarray:
     """Least squares with C3 ≥ 0, and C2 ≥ 0 where C3 is 0: else the wall would lose its stiffness."""
     X = linear.design * np.sqrt(weights)[:, None]
     A, b = X.T @ X, X.T @ (linear.target * np.sqrt(weights))
+    if not (np.all(np.isfinite(A)) and np.all(np.diag(A) > 1e-100)):  # the passes have left all points behind
+        raise _no_curve(weights)
     theta = np.zeros(3)
     for free in (3, 2, 1):
         scale = 1 / np.sqrt(np.diag(A)[:free])
@@ -175,6 +203,13 @@ def solve_bounded(linear: Linear, weights: np.ndarray) -> np.ndarray:
             "that the columns are height and gauge pressure, their units, the diameter and the wall."
         )
     return theta
+
+
+def _no_curve(weights: np.ndarray) -> InvalidInput:
+    return InvalidInput(
+        f"only {np.count_nonzero(weights)} of {weights.size} points lie near one curve: check that the columns are height and "
+        "gauge pressure, their units, the diameter and the wall."
+    )
 
 
 def median_scale(residuals: np.ndarray, fitted: int = 3) -> float:
@@ -213,18 +248,18 @@ def scale_of_good(residuals: np.ndarray, weights: np.ndarray, fitted: float = 3)
 
 
 def regress(dimensions: Dimensions, points: Points, *, robust: bool) -> Solution:
-    """Fit θ to ``points``: near by Huber's weights, nearer by bisquare ones, then without the outliers."""
+    """Fit θ to ``points``: from the least median by bisquare weights, then without the outliers (Yohai's MM estimate)."""
     theta, eta = start(dimensions, points), dimensions.at_least(points.height)
-    weights, scale = np.ones(len(points)), 1.0
-    for stage in ("huber", "bisquare", "trim") if robust else ("plain",):
+    weights, scale = np.ones(len(points)), math.inf if robust else 1.0
+    if robust:
+        theta = least_median(dimensions, points, theta)
+    for stage in ("bisquare", "trim") if robust else ("plain",):
         for _ in range(PASSES):
             eta = project(dimensions, points, theta, eta)
             linear = linearise(dimensions, points, theta, eta)
             residuals = linear.residuals(theta)
-            if stage == "huber":
-                scale = median_scale(residuals)
-                weights = huber(residuals / scale)
-            elif stage == "bisquare":
+            if stage == "bisquare":
+                scale = min(scale, median_scale(residuals))  # never wider: outliers would come back in
                 weights = bisquare(residuals / scale)
             elif stage == "trim":
                 weights = good_points(residuals, scale)
@@ -236,4 +271,6 @@ def regress(dimensions: Dimensions, points: Points, *, robust: bool) -> Solution
                 break
     eta = project(dimensions, points, theta, eta)
     linear = linearise(dimensions, points, theta, eta)
+    if np.mean(weights == 0) > 0.5:
+        raise _no_curve(weights)
     return Solution(theta, linear, weights, scale_of_good(linear.residuals(theta), weights))
