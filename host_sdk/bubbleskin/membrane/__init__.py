@@ -3,7 +3,15 @@
 from bubbleskin.membrane.balloon import Jump, LimitPoint, YeohBalloon, yeoh_pressure
 from bubbleskin.membrane.calibration import Calibration, compare_tables, table_difference
 from bubbleskin.membrane.data import BadRowWarning, Measurements, read_csv, write_csv
-from bubbleskin.membrane.fit import IdentifiabilityWarning, LackOfFitWarning, Noise, Parameters, YeohFit, fit_yeoh
+from bubbleskin.membrane.fit import (
+    IdentifiabilityWarning,
+    LackOfFitWarning,
+    Noise,
+    Parameters,
+    UnlikelyFitWarning,
+    YeohFit,
+    fit_yeoh,
+)
 from bubbleskin.membrane.presets import PRESETS, Preset, preset
 from bubbleskin.membrane.sheet import SheetFit, fit_measurements, fit_sheet
 from bubbleskin.membrane.synthetic import simulate_sheet
@@ -24,6 +32,7 @@ __all__ = [
     "SheetFit",
     "Table",
     "TableError",
+    "UnlikelyFitWarning",
     "YeohBalloon",
     "YeohFit",
     "build_table",

@@ -29,7 +29,7 @@ LACK_OF_FIT_LEVEL = 0.01
 
 
 OUTLIERS_LIMIT = 0.2
-"""Share of the points that is worth a warning; up to twice as many do not spoil the fit."""
+"""Share of the points that is worth a warning. So many may be anything; of more, it depends on where they stand."""
 STIFFNESS = (3e3, 5e6)
 """Shear moduli (Pa) of silicone rubbers, from the softest gels to hard ones."""
 
@@ -200,15 +200,16 @@ def fit_yeoh(
     The points may come from one bubble or, pooled, from many; :func:`fit_sheet` fits each by itself.
     ``radius``, ``thickness``, ``wall`` and ``surface`` are taken as given, as :class:`YeohBalloon` has them.
     Noise is in both axes; only the ratio of its two standard deviations matters, for its size is found from
-    the residuals. Outliers are points that noise would put so far off the curve once in 16000 times. C3 stays
-    ≥ 0.
+    the residuals. Outliers are points that noise would put so far off the curve once in 16000 times. A fifth of
+    the points may be anything. C3 stays ≥ 0.
 
     ``step`` (n,) names the setting of each point, and points of one setting are repeats (triplicates).
     If they agree with each other much better than with the model, the model is at fault, not the noise:
     a note says so and the covariance is widened to cover it.
 
     Warns :class:`IdentifiabilityWarning` when the data (all on the plateau, say) leaves the curve between
-    6 and 14 mm open. Raises ``InvalidInput`` for too few or impossible points.
+    6 and 14 mm open, and :class:`UnlikelyFitWarning` where more than a fifth of the points was left out. Raises
+    ``InvalidInput`` for too few or impossible points, and where most lie near no curve.
     """
     dimensions = Dimensions(radius, thickness, wall, surface)
     dimensions.balloon(np.array([YeohBalloon.mu, YeohBalloon.c2, YeohBalloon.c3]))  # Refuses impossible sizes.
@@ -236,7 +237,7 @@ def fit_yeoh(
             )
             notes.append(note)
             warnings.warn(note, LackOfFitWarning, stacklevel=2)
-    for doubt in (_unlikely_units(float(solution.theta[0])), _many_outliers(solution.weights == 0)):
+    for doubt in (_unlikely_units(float(solution.theta[0])), many_outliers(solution.weights == 0)):
         if doubt:
             notes.append(doubt)
             warnings.warn(doubt, UnlikelyFitWarning, stacklevel=2)
@@ -262,13 +263,14 @@ def _unlikely_units(mu: float) -> str:
     )
 
 
-def _many_outliers(outliers: np.ndarray) -> str:
+def many_outliers(outliers: np.ndarray) -> str:
+    """A sentence where more points were left out, of ``outliers`` (n,), than are sure to be the wrong ones."""
     share = float(np.mean(outliers))
     if share <= OUTLIERS_LIMIT:
         return ""
     return (
-        f"{100 * share:.0f} % of the points were left out as outliers; with more than {100 * OUTLIERS_LIMIT:.0f} % nobody knows "
-        "which are the good ones. Look at the picture."
+        f"{100 * share:.0f} % of the points were left out as outliers. Above {100 * OUTLIERS_LIMIT:.0f} % they may be the good "
+        "ones, where the others agree on something else: look at the picture (bubbleskin plot fit)."
     )
 
 

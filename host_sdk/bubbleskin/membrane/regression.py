@@ -4,12 +4,11 @@ The pressure is linear in θ = (μ, C2, C3), so each pass is a linear least-squa
 enters by projection: every point is moved to the nearest place η on the curve, near in units of its own
 noise, and its pressure is carried there along the tangent (orthogonal distance regression, Boggs and
 Rogers 1990, for a model that is linear in its constants). Outliers are weighed down by Tukey's bisquare
-around a start that a fifth of the points cannot spoil (an MM estimate, Yohai 1987).
+around the curve of least median distance, with the noise found there (an MM estimate, Yohai 1987).
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -218,6 +217,15 @@ def median_scale(residuals: np.ndarray, fitted: int = 3) -> float:
     return max(1.4826 * float(np.median(np.abs(residuals))) * np.sqrt(residuals.size / spare), 1e-3)
 
 
+def least_median_scale(residuals: np.ndarray, fitted: int = 3) -> float:
+    """That of residuals whose median has been made as small as it gets: with Rousseeuw and Leroy's factor for few points.
+
+    It stays as it is while the weights move: found anew for each curve, it would shrink around a handful of points.
+    """
+    few = 1 + 5 / max(residuals.size - fitted, 1)
+    return max(1.4826 * few * float(np.median(np.abs(residuals))), 1e-3)
+
+
 def huber(u: np.ndarray) -> np.ndarray:
     """Huber's weights at residuals ``u`` in units of the scale."""
     return np.minimum(1.0, HUBER / np.maximum(np.abs(u), 1e-300))
@@ -250,16 +258,17 @@ def scale_of_good(residuals: np.ndarray, weights: np.ndarray, fitted: float = 3)
 def regress(dimensions: Dimensions, points: Points, *, robust: bool) -> Solution:
     """Fit θ to ``points``: from the least median by bisquare weights, then without the outliers (Yohai's MM estimate)."""
     theta, eta = start(dimensions, points), dimensions.at_least(points.height)
-    weights, scale = np.ones(len(points)), math.inf if robust else 1.0
+    weights, scale = np.ones(len(points)), 1.0
     if robust:
         theta = least_median(dimensions, points, theta)
+        nearest = project(dimensions, points, theta, eta)
+        scale = least_median_scale(linearise(dimensions, points, theta, nearest).residuals(theta))
     for stage in ("bisquare", "trim") if robust else ("plain",):
         for _ in range(PASSES):
             eta = project(dimensions, points, theta, eta)
             linear = linearise(dimensions, points, theta, eta)
             residuals = linear.residuals(theta)
             if stage == "bisquare":
-                scale = min(scale, median_scale(residuals))  # never wider: outliers would come back in
                 weights = bisquare(residuals / scale)
             elif stage == "trim":
                 weights = good_points(residuals, scale)

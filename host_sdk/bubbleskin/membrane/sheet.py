@@ -23,10 +23,12 @@ from bubbleskin.membrane.fit import (
     IdentifiabilityWarning,
     Noise,
     Parameters,
+    UnlikelyFitWarning,
     YeohFit,
     as_points,
     fit_yeoh,
     make_fit,
+    many_outliers,
     open_constants,
 )
 from bubbleskin.membrane.regression import (
@@ -163,7 +165,8 @@ def fit_sheet(
 
     ``bubble`` (n,) are the bubbles' numbers, one per point; the rest is as for :func:`fit_yeoh`. A bubble
     may have as few as one point. Warns :class:`IdentifiabilityWarning` with the numbers of bubbles whose
-    curve stays open between 6 and 14 mm. Raises ``InvalidInput`` if all together have too few points.
+    curve stays open between 6 and 14 mm, :class:`UnlikelyFitWarning` with those of which more than a fifth of the
+    points was left out. Raises ``InvalidInput`` if all together have too few points.
     """
     dimensions = Dimensions(radius, thickness, wall, surface)
     points = as_points(height, pressure, noise)
@@ -178,6 +181,8 @@ def fit_sheet(
     sheet.run()
     covariances = sheet.covariances()
     fits = {}
+    outlying: dict[int, str] = {}
+    left_open: dict[int, str] = {}
     for k, n in enumerate(numbers):
         mine = index == k
         theta = sheet.phi[k] * sheet.unit
@@ -185,17 +190,20 @@ def fit_sheet(
         solution = Solution(theta, linear, sheet.weights[mine], sheet.scale)
         own = points.of(mine)
         fit = make_fit(dimensions, own, solution, covariances[k], sheet.dof)
-        doubt = open_constants(fit, own)
-        fits[int(n)] = replace(fit, notes=(doubt,)) if doubt else fit
-    doubtful = [n for n, fit in fits.items() if fit.notes]
-    if doubtful:
-        warnings.warn(
-            f"bubble{'s' * (len(doubtful) > 1)} {', '.join(map(str, doubtful))}: {fits[doubtful[0]].notes[0]}",
-            IdentifiabilityWarning,
-            stacklevel=2,
-        )
+        outlying[int(n)], left_open[int(n)] = many_outliers(fit.outliers), open_constants(fit, own)
+        fits[int(n)] = replace(fit, notes=tuple(doubt for doubt in (outlying[int(n)], left_open[int(n)]) if doubt))
+    _warn(outlying, UnlikelyFitWarning)
+    _warn(left_open, IdentifiabilityWarning)
     mean = Parameters(*(float(v) for v in sheet.mean * sheet.unit))
     return SheetFit(fits, mean, sheet.spread * np.outer(sheet.unit, sheet.unit), sheet.scale)
+
+
+def _warn(doubts: Mapping[int, str], kind: type[UserWarning]) -> None:
+    """One warning with the numbers of all bubbles that have a doubt, and the first of these doubts."""
+    doubtful = [n for n, doubt in doubts.items() if doubt]
+    if doubtful:
+        bubbles = f"bubble{'s' * (len(doubtful) > 1)} {', '.join(map(str, doubtful))}"
+        warnings.warn(f"{bubbles}: {doubts[doubtful[0]]}", kind, stacklevel=3)
 
 
 class _Sheet:
