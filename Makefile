@@ -85,7 +85,7 @@ fuzz: setup ## look for bytes that harm the firmware, ten minutes; keeps what it
 hostile: setup micropython ## 100,000 requests that nobody should send, for each board on MicroPython, three minutes
 	$(BIN)/python tools/stress/hostile.py
 
-leaks: setup micropython ## 500 connections to each target and 100,000 states: what is left of them; eight minutes
+leaks: setup micropython ## 500 connections to each target but the chip, and 100,000 states: what is left of them; ten minutes
 	$(BIN)/python tools/stress/leaks.py
 
 readers: setup ## 100,000 files that are none, for every reader; six minutes
