@@ -109,7 +109,12 @@ def _open_simulated(scheme: str, rest: str) -> "tuple[Transport, Simulated]":
             f"{scheme}://{rest} is not a simulated board; write {scheme}://{boards.DEFAULT}, or the path of a board's file, "
             f"with options after a question mark, such as {scheme}://{boards.DEFAULT}?seed=3."
         )
-    return open_board(scheme, board, dict(parse_qsl(options, keep_blank_values=True)))
+    pairs = parse_qsl(options, keep_blank_values=True)
+    names = [name for name, _ in pairs]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InvalidInput(f"{scheme}://{rest} says {twice[0]} more than once; give it once.")
+    return open_board(scheme, board, dict(pairs))
 
 
 def _checked(timeout: float, layout: Layout | None) -> float:

@@ -67,6 +67,7 @@ def connecting(url):
         ("sim://wristband7?speed=2", ["'speed'", "seed, spread, realtime"]),
         ("sim://wristband7?seed=x", ["seed of sim://wristband7 is 'x'", "which is not a number"]),
         ("sim:wristband7", ["sim://wristband7"]),
+        ("sim://wristband7?seed=1&loss=0&seed=2", ["says seed more than once"]),
         ("sim://wristband7?seed=-1", ["seed of sim://wristband7 is -1", "0 to 4294967295"]),
         ("sim://wristband7?seed", ["seed of sim://wristband7 is ''"]),
         ("sim://wristband7?loss=2", ["drop is 2", "0 to 1"]),

@@ -233,3 +233,10 @@ def test_a_play_that_is_cancelled_in_asyncio_stops_the_wristband():
             return (await skin.state()).mode, (await skin.playing()).state
 
     assert asyncio.run(main()) == ("holding", "ended"), "what STOP makes of it"
+
+
+def test_targets_in_metres_are_refused_before_they_are_played():
+    with bs.connect("sim://wristband7?contact=0") as skin:
+        with pytest.raises(bs.InvalidInput, match=r"greatest height is 0\.009 mm.* metres, give them times 1000"):
+            skin.play(bs.Sequence([bs.Step([0.006] * 7, 0.1), bs.Step([0.009] * 6 + [None], 0.1)]))
+        skin.play(bs.Sequence([bs.Step([0.0] * 7, 0.1), bs.Step(None, until=bs.After(0.1))]))

@@ -14,6 +14,7 @@ from bubbleskin.layout import Layout
 from bubbleskin.link.framing import crc32
 from bubbleskin.sequence.model import Sequence
 from bubbleskin.sequence.steps import EASINGS, THEN, After, Repeat, Step
+from bubbleskin.shape.heightfield import refuse_metres
 
 _PLACE_MM = 0.5
 """How far a bubble may be from where a sequence wants it."""
@@ -92,6 +93,8 @@ def check(sequence: Sequence, info: Info, layout: Layout) -> None:
                 f"{off[bubble]:.1f} mm from where this {info.board} has it."
             )
     high = info.height_max_mm
+    targets = (target for step in sequence.each for target in step.targets_mm or () if target is not None)
+    refuse_metres(max(targets, default=0.0), high)
     for index, step in enumerate(sequence.each):
         for bubble, target in enumerate(step.targets_mm if step.targets_mm is not None else ()):
             if target is not None and round(target * 1000) > round(high * 1000):

@@ -49,12 +49,17 @@ def sample(heights_mm: Heights, layout: Layout, height_max_mm: float, fill: str 
                 f"The height of bubble {bubble}, {heights[bubble]:g} mm, {what}; heights are 0 to {height_max_mm:g} mm."
                 f"{_guess(heights_mm, heights, height_max_mm)}"
             )
-    if 0 < heights.max() < _METRES:
+    refuse_metres(heights.max(), height_max_mm)
+    return heights.clip(0, height_max_mm)
+
+
+def refuse_metres(greatest_mm: float, height_max_mm: float) -> None:
+    """Raise where the greatest of several heights, in mm, is one that makes sense only in m."""
+    if 0 < greatest_mm < _METRES:
         raise InvalidInput(
-            f"The greatest height is {heights.max():g} mm, less than any bubble at rest has. Heights are in mm: if these are "
+            f"The greatest height is {greatest_mm:g} mm, less than any bubble at rest has. Heights are in mm: if these are "
             f"metres, give them times 1000, up to {height_max_mm:g}."
         )
-    return heights.clip(0, height_max_mm)
 
 
 def _field(heights_mm: Any, layout: Layout, fill: str | None) -> NDArray[np.float64]:
