@@ -51,6 +51,7 @@ def assert_one_sentence(outcome, status, *words):
         (["show", *["8"] * 6, "15", *SIM], ["bubble 6", "above the limit of 14 mm"]),
         (["show", *["8"] * 6, "high", *SIM], ["'high'", "not a height"]),
         (["show", "dome", *SIM], ["--shape dome"]),
+        (["show", "face.npy", *SIM], ["--file face.npy"]),
         (["show", *SIM], ["one way"]),
         (["show", "--all", "8", "--shape", "dome", *SIM], ["one way"]),
         (["show", "--all", "8", "--over", "-1", *SIM], ["--over is -1"]),

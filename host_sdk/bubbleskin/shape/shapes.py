@@ -55,6 +55,10 @@ def parse_heights(texts: Sequence[str]) -> NDArray[np.float64]:
             raise InvalidInput(f"There is no option {checks.shown(text)}; see --help.")
         if text in SHAPES:
             raise InvalidInput(f"{text!r} is no height in mm; the shape of that name is --shape {text}.")
+        if text.lower().endswith((".npy", ".csv")):
+            raise InvalidInput(
+                f"{checks.shown(text)} is no height in mm; the heightfield of that file is --file {text}."
+            )
         try:
             heights.append(table.number(Cell(text.strip(), 1, position)))
         except CellError as error:
