@@ -118,11 +118,14 @@ def beforehand(nominal: Nominal) -> tuple[Floats, Floats]:
 _NOT_BELOW_ZERO = (MU, C2, C3, SOFTENING, QUICK, SLOW)
 
 
-def fit(data: Data, nominal: Nominal) -> Estimate:
-    """Fit all unknowns; `ValueError` where there is too little to fit."""
-    if len(data.first) < MEANS_LEAST:
-        raise ValueError(f"only {len(data.first)} means of a quiet line, and {MEANS_LEAST} are needed")
+def fit(data: Data, nominal: Nominal, flow: tuple[float, float] | None = None) -> Estimate:
+    """Fit all unknowns. `flow`: what others tell of the fill valve's flow factor, and its standard deviation.
+
+    There must be `MEANS_LEAST` means.
+    """
     prior, prior_sd = beforehand(nominal)
+    if flow is not None:
+        prior[FILL], prior_sd[FILL] = _together((prior[FILL], prior_sd[FILL]), flow)
     low = np.full(len(prior), -np.inf)
     low[list(_NOT_BELOW_ZERO)] = 0.0
     measured = data.mean(data.pressure)
@@ -151,6 +154,13 @@ def fit(data: Data, nominal: Nominal) -> Estimate:
         largest_mm=float(heights(values, data).max()),
         lift=data.lift,
     )
+
+
+def _together(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+    """Two independent values of one figure, each with its standard deviation, as one."""
+    weights = one[1] ** -2.0, other[1] ** -2.0
+    mean = (weights[0] * one[0] + weights[1] * other[0]) / sum(weights)
+    return mean, sum(weights) ** -0.5
 
 
 def _deviations(values: Floats, data: Data, off: float) -> Floats:

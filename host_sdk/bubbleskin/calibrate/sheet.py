@@ -1,0 +1,71 @@
+"""All bubbles together: each fitted by itself, then again with what the others tell of its restrictor."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.calibrate import fit as fits
+from bubbleskin.calibrate import yardstick
+from bubbleskin.calibrate.data import Data, of_trace
+from bubbleskin.calibrate.fit import FILL, FILL_LATE, MEANS_LEAST, Estimate
+from bubbleskin.calibrate.nominal import Nominal
+from bubbleskin.calibrate.trace import Trace
+
+Floats = NDArray[np.float64]
+
+_COMPARED_LEAST = 3
+"""Bubbles: with fewer there is hardly anything to compare with."""
+_COMPARED_SD = 0.01
+"""Share by which a comparison is off besides its noise: pressures at which restrictors work, heat."""
+
+
+def estimate(
+    traces: Sequence[Trace], zero_pa: Floats, atmosphere_pa: float, nominal: Nominal
+) -> tuple[dict[int, Estimate], dict[int, Data]]:
+    """What is found of every bubble that has enough to fit, and the data of all."""
+    data = {
+        bubble: of_trace(trace, bubble, float(zero_pa[bubble]), atmosphere_pa, nominal)
+        for trace in traces
+        for bubble in trace.bubbles
+    }
+    enough = {bubble: one for bubble, one in data.items() if len(one.first) >= MEANS_LEAST}
+    alone = {bubble: fits.fit(one, nominal) for bubble, one in enough.items()}
+    flows = _told_by_others(traces, data, alone)
+    return {bubble: fits.fit(data[bubble], nominal, flows[bubble]) if flows else one for bubble, one in alone.items()}, data
+
+
+def _told_by_others(
+    traces: Sequence[Trace], data: Mapping[int, Data], alone: Mapping[int, Estimate]
+) -> dict[int, tuple[float, float]]:
+    """Of each bubble what the reservoir and the others say of its fill valve's flow factor: value and standard deviation."""
+    draws = [_draw(trace, data, alone) for trace in traces if all(bubble in alone for bubble in trace.bubbles)]
+    if sum(len(draw.taken) for draw in draws) < _COMPARED_LEAST:
+        return {}
+    flows = yardstick.compare(draws)
+    own = np.array([alone[bubble].values[FILL] for bubble in flows.bubbles])
+    own_sd = np.array([alone[bubble].sd[FILL] for bubble in flows.bubbles])
+    if (flows.value <= 0).any():
+        return {}
+    # In logarithms: what is compared is own + a constant that nobody knows.
+    n = len(own)
+    apart = np.log(flows.value) - np.log(own)
+    noise = flows.covariance / np.outer(flows.value, flows.value) + _COMPARED_SD**2 * np.eye(n)
+    found = {}
+    for k, bubble in enumerate(flows.bubbles):
+        others = np.arange(n) != k
+        weight = np.linalg.pinv(noise[np.ix_(others, others)] + np.diag((own_sd / own)[others] ** 2)).sum(axis=0)
+        constant = float(weight @ apart[others] / weight.sum())
+        variance = float(1.0 / weight.sum() + noise[k, k])
+        value = float(flows.value[k] * np.exp(-constant))
+        found[bubble] = value, value * variance**0.5
+    return {bubble: found.get(bubble, (1.0, 10.0)) for bubble in alone}
+
+
+def _draw(trace: Trace, data: Mapping[int, Data], alone: Mapping[int, Estimate]) -> yardstick.Draw:
+    taken = {}
+    for bubble in trace.bubbles:
+        fill = data[bubble].fill
+        moved = fill.air - alone[bubble].values[FILL_LATE] * fill.late
+        taken[bubble] = np.append(np.diff(moved), 0.0)
+    return yardstick.Draw(trace.tick_s, trace.supply_now_pa, trace.supply_pa, taken)
