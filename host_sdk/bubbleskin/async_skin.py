@@ -36,6 +36,10 @@ from bubbleskin.telemetry.recording import Recording
 from bubbleskin.telemetry.stream import Telemetry
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bubbleskin.calibrate.measure import Progress as CalibrateProgress
+    from bubbleskin.calibrate.result import SelfCalibration
     from bubbleskin.membrane.calibration import Calibration
     from bubbleskin.membrane.table import Table
     from bubbleskin.sim.board import Simulated
@@ -318,6 +322,32 @@ class AsyncSkin:
             await self.link.call("TRIM_WRITE", (), rows)
         if save:
             await self.save()
+
+    async def calibrate(
+        self,
+        bubbles: Iterable[int] | int | None = None,
+        *,
+        save: bool = True,
+        board: "str | Path | None" = None,
+        progress: "CalibrateProgress | None" = None,
+    ) -> "SelfCalibration":
+        """See `Skin.calibrate`."""
+        from bubbleskin.calibrate import session
+
+        checks.flag("save", save)
+        found = await session.calibrate(self, bubbles, board, progress)
+        if found.accepted:
+            await session.upload(self, found, save)
+        return found
+
+    async def upload_calibration(self, calibration: "SelfCalibration", save: bool = False) -> None:
+        """See `Skin.upload_calibration`."""
+        from bubbleskin.calibrate import session
+        from bubbleskin.calibrate.result import SelfCalibration
+
+        checks.instance("calibration", calibration, SelfCalibration, "what `calibrate` or `SelfCalibration.load` returns")
+        checks.flag("save", save)
+        await session.upload(self, calibration, save)
 
     async def save(self) -> StoreInfo:
         """See `Skin.save`."""

@@ -23,6 +23,10 @@ from bubbleskin.shape.heightfield import Heights
 from bubbleskin.telemetry.recording import Recording
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bubbleskin.calibrate.measure import Progress as CalibrateProgress
+    from bubbleskin.calibrate.result import SelfCalibration
     from bubbleskin.membrane.calibration import Calibration
     from bubbleskin.membrane.table import Table
     from bubbleskin.sim.board import Simulated
@@ -253,6 +257,28 @@ class Skin:
         Flows of one board's restrictors that contradict each other are `InvalidInput`, but with `anyway`.
         """
         run_sync(self._skin.upload_trim(trim, save, anyway=anyway))
+
+    def calibrate(
+        self,
+        bubbles: Iterable[int] | int | None = None,
+        *,
+        save: bool = True,
+        board: "str | Path | None" = None,
+        progress: "CalibrateProgress | None" = None,
+    ) -> "SelfCalibration":
+        """Let the wristband measure itself with its own sensors, and use what is found.
+
+        `bubbles`: one, some, or None for all. They rise to 13 mm in groups that do not touch, which takes 20 s for 7 and 40 s
+        for 19; nobody may hold or press them. Bubbles that are accepted get a table and a trim of their own; all others keep
+        what they have, and the result says why. With `save` it is kept for good; what is saved stays until all of the new is
+        there. `board`: the file of a board of your own. `progress` is called with a `CalibrationProgress` now and then.
+        Raises `LinkError` where the wristband is lost: it then vents, and has what it had.
+        """
+        return run_sync(self._skin.calibrate(bubbles, save=save, board=board, progress=progress))
+
+    def upload_calibration(self, calibration: "SelfCalibration", save: bool = False) -> None:
+        """Use a calibration of this wristband, such as one from a file; only while it is vented. `save` as in `calibrate`."""
+        run_sync(self._skin.upload_calibration(calibration, save))
 
     def save(self) -> StoreInfo:
         """Keep the tables, trim and settings in use without power, for every start from now on; returns the store's state.

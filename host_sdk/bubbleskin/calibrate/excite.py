@@ -56,10 +56,15 @@ def steps(tick_s: float) -> Iterator[Step]:
         yield Step(height, times * UP_S, False)
 
 
+def phase(bubbles: int, tick_s: float) -> float:
+    """By how much later the last bubble of a group does what the first does, and a bubble more would."""
+    return (UP_S if tick_s < QUICK_TICK_S else SLOWER * UP_S) if bubbles > 1 else 0.0
+
+
 def device_seconds(groups: int, tick_s: float) -> float:
     """How long it takes, vented again at the end."""
     each = sum(step.seconds for step in steps(tick_s))
-    return REST_S + groups * (each + GAP_S)
+    return REST_S + groups * (each + phase(2, tick_s) + GAP_S)
 
 
 def groups(layout: Layout, bubbles: Iterable[int]) -> list[list[int]]:

@@ -13,6 +13,12 @@ FIELDS = ("pressure", "fill", "vent", "status", "faults")
 
 Floats = NDArray[np.float64]
 
+EMPTIED_S = 1.5
+"""After which what was full before is empty."""
+SOME_PA = 3000.0
+SEVERAL = 20
+"""Readings."""
+
 
 @dataclass(frozen=True, eq=False)
 class Trace:
@@ -32,6 +38,8 @@ class Trace:
     """Readings that have not come."""
     faults: dict[int, tuple[str, ...]]
     """What bubbles have reported meanwhile."""
+    others_pa: dict[int, float]
+    """What sensors of bubbles that were to be empty said, Pa: the highest of each that had some pressure."""
 
     def column(self, bubble: int) -> int:
         """Where a bubble stands."""
@@ -54,6 +62,9 @@ def of_states(states: Sequence[State], bubbles: Sequence[int], tick_s: float, fi
         rows = np.array([getattr(state, name) for state in states], float)[:, columns] * unit
         return np.column_stack([np.interp(every, ticks, rows[:, k]) for k in range(len(columns))])
 
+    late = [state.pressure_kpa for state in states if state.time - states[0].time > EMPTIED_S]
+    highest = 1e3 * np.median(_highest(late), axis=0) if len(late) >= SEVERAL else np.zeros(len(states[0].pressure_kpa))
+    others = {k: float(p) for k, p in enumerate(highest) if k not in bubbles and p > SOME_PA}
     faults: dict[int, tuple[str, ...]] = {}
     for state in states:
         for bubble in bubbles:
@@ -69,4 +80,10 @@ def of_states(states: Sequence[State], bubbles: Sequence[int], tick_s: float, fi
         fitted_from=round(fitted_from_s / tick_s),
         lost=len(every) - len(ticks),
         faults=faults,
+        others_pa=others,
     )
+
+
+def _highest(rows: Sequence[Floats]) -> Floats:
+    """The few highest readings of each sensor: one alone may be noise."""
+    return np.sort(np.array(rows), axis=0)[-SEVERAL:]

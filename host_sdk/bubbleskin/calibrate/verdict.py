@@ -1,0 +1,127 @@
+"""Whether what was found of a bubble can be used, and if not, what is wrong: each a name and a sentence."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.calibrate.fit import FILL, LEAK, MU, RADIUS, VENT, Estimate
+from bubbleskin.calibrate.nominal import Nominal
+from bubbleskin.calibrate.trace import SOME_PA, Trace
+
+Floats = NDArray[np.float64]
+
+ACCEPTED, REDO, OUT_OF_FAMILY = "accepted", "redo", "out of family"
+
+GOOD_PA = 60.0
+"""What a model of rubber is usually off: χ is the residual's RMS by this and the noise of a mean."""
+CHI_MOST = 4.0
+LEAK_UNIT = 53.0
+"""µJ/(s kPa) with which a bubble of 12 mm loses 1 % of its air in a second."""
+LEAK_SHARE = 0.004
+"""Of its air a second, of a bubble at 12 mm: what silicone lets through is a twentieth of this."""
+LEAK_SURE = 4.0
+LIFT_MOST = 14.0
+"""Pa per µJ/ms: twice what a whole tube and rubber make. Half the bore makes sixteen times the resistance."""
+FLOW_MOST = 1.25
+STIFFNESS_MOST = 1.35
+"""Of the middle one's of its sheet: walls and rubber of one sheet differ by a fifth."""
+RADIUS_MOST = 0.04
+HEIGHT_LEAST_MM = 11.0
+ZERO_MOST_PA = 1500.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What becomes of one bubble's figures."""
+
+    verdict: str
+    """`accepted`, `redo` or `out of family`."""
+    reasons: tuple[str, ...] = ()
+    """Names: lost telemetry, faulted, too little data, bad fit, leaking, kinked tube, restrictor, wrong bubble, sensor zero,
+    swapped."""
+    advice: str = ""
+    """A sentence or more."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether its figures are used."""
+        return self.verdict == ACCEPTED
+
+
+def judge(
+    bubble: int,
+    trace: Trace,
+    zero_pa: float,
+    estimates: Mapping[int, Estimate],
+    nominal: Nominal,
+) -> Verdict:
+    """The verdict on one bubble among those that were fitted."""
+    redo = _not_measured(bubble, trace, estimates.get(bubble))
+    odd: list[tuple[str, str]] = []
+    if abs(zero_pa) > ZERO_MOST_PA:
+        odd.append(("sensor zero", f"Its sensor says {zero_pa / 1e3:.2f} kPa without pressure: replace it."))
+    if (estimate := estimates.get(bubble)) is not None:
+        odd += _odd(bubble, estimate, estimates, nominal)
+    for other, pressure in trace.others_pa.items():
+        if not _rose(bubble, trace):
+            said = f"The sensor of bubble {other} rose to {pressure / 1e3:.1f} kPa while it was filled and its own did not: "
+            odd.append(("swapped", said + "see which tube is whose."))
+    if odd:
+        return Verdict(OUT_OF_FAMILY, tuple(name for name, _ in odd), " ".join(said for _, said in odd))
+    if redo:
+        return Verdict(REDO, tuple(name for name, _ in redo), " ".join(said for _, said in redo))
+    return Verdict(ACCEPTED)
+
+
+def _rose(bubble: int, trace: Trace) -> bool:
+    return float(np.percentile(trace.pressure_pa[:, trace.column(bubble)], 90)) > SOME_PA
+
+
+def chi(estimate: Estimate) -> float:
+    """The residual's RMS, by what is usual."""
+    return estimate.rms_pa / GOOD_PA
+
+
+def leak_share(estimate: Estimate) -> float:
+    """Of its air, what a bubble at 12 mm loses in a second."""
+    return 0.01 * float(estimate.values[LEAK]) / LEAK_UNIT
+
+
+def _not_measured(bubble: int, trace: Trace, estimate: Estimate | None) -> list[tuple[str, str]]:
+    found = []
+    if faults := trace.faults.get(bubble):
+        found.append(("faulted", f"It reported {', '.join(faults)} on its way: see `fault_log()`, clear it and repeat."))
+    if trace.lost:
+        found.append(("lost telemetry", f"{trace.lost} readings have not come: look at the link's cable and repeat."))
+    if estimate is None:
+        found.append(("too little data", "Its line was quiet too seldom to measure: look whether it rises at all."))
+    elif estimate.largest_mm < HEIGHT_LEAST_MM:
+        found.append(("too little data", f"It rose to {estimate.largest_mm:.1f} mm only: see the supply in `health()`."))
+    elif chi(estimate) > CHI_MOST:
+        found.append(("bad fit", f"Its pressures are {estimate.rms_pa:.0f} Pa off every rubber: leave it alone and repeat."))
+    return found
+
+
+def _odd(
+    bubble: int, estimate: Estimate, estimates: Mapping[int, Estimate], nominal: Nominal
+) -> list[tuple[str, str]]:
+    found = []
+    v, sd = estimate.values, estimate.sd
+    leak = leak_share(estimate)
+    if leak > LEAK_SHARE and v[LEAK] > LEAK_SURE * sd[LEAK]:
+        found.append(("leaking", f"At 12 mm it loses {100 * leak:.1f} % of its air a second: look at barb, tube and rubber."))
+    if estimate.lift > LIFT_MOST:
+        times = estimate.lift / LIFT_MOST * 2.0
+        found.append(("kinked tube", f"Its tube resists {times:.1f} times as usual: straighten it, or look for dirt."))
+    for name, at in (("fill", FILL), ("vent", VENT)):
+        if not 1.0 / FLOW_MOST < v[at] < FLOW_MOST:
+            found.append(("restrictor", f"Its {name} valve lets {v[at]:.2f} times the usual through: look for dirt in it."))
+    stiffness = {key: float(one.values[MU] / one.values[RADIUS]) for key, one in estimates.items()}
+    share = stiffness[bubble] / float(np.median(list(stiffness.values())))
+    if not 1.0 / STIFFNESS_MOST < share < STIFFNESS_MOST:
+        found.append(("wrong bubble", f"It is {share:.2f} times as stiff as the middle one of its sheet: look which it is."))
+    if abs(v[RADIUS] / (0.5 * nominal.rest_mm) - 1.0) > RADIUS_MOST:
+        found.append(("wrong bubble", f"At rest it is {2 * v[RADIUS]:.2f} mm high and not {nominal.rest_mm:g}: look which it is."))
+    return found
