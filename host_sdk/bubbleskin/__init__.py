@@ -3,6 +3,8 @@
 TYPE_CHECKING = False  # as of `typing`, which is not waited for
 if TYPE_CHECKING:
     from bubbleskin.async_skin import AsyncSkin
+    from bubbleskin.calibrate.measure import CalibrationProgress
+    from bubbleskin.calibrate.result import BubbleCalibration, SelfCalibration
     from bubbleskin.connecting import aconnect, connect
     from bubbleskin.contact.fit import ContactFit, Measured, fit_contact
     from bubbleskin.contact.model import CompliantContact, Shape
@@ -53,8 +55,10 @@ if TYPE_CHECKING:
 _ROOMS = {
     "After": "sequence.steps",
     "AsyncSkin": "async_skin",
+    "BubbleCalibration": "calibrate.result",
     "BubbleskinError": "errors",
     "Calibration": "membrane",
+    "CalibrationProgress": "calibrate.measure",
     "CompliantContact": "contact.model",
     "ContactFit": "contact.fit",
     "DeviceFault": "errors",
@@ -76,6 +80,7 @@ _ROOMS = {
     "Recording": "telemetry.recording",
     "Repeat": "sequence.steps",
     "RigidContact": "contact.rigid",
+    "SelfCalibration": "calibrate.result",
     "Sequence": "sequence.model",
     "Setting": "device.settings",
     "Settled": "sequence.steps",
@@ -105,8 +110,10 @@ _MODULES = {"sequences": "sequence.library", "shapes": "shape.shapes"}
 __all__ = [
     "After",
     "AsyncSkin",
+    "BubbleCalibration",
     "BubbleskinError",
     "Calibration",
+    "CalibrationProgress",
     "CompliantContact",
     "ContactFit",
     "DeviceFault",
@@ -128,6 +135,7 @@ __all__ = [
     "Recording",
     "Repeat",
     "RigidContact",
+    "SelfCalibration",
     "Sequence",
     "Setting",
     "Settled",

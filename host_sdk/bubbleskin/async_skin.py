@@ -36,8 +36,6 @@ from bubbleskin.telemetry.recording import Recording
 from bubbleskin.telemetry.stream import Telemetry
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from bubbleskin.calibrate.measure import Progress as CalibrateProgress
     from bubbleskin.calibrate.result import SelfCalibration
     from bubbleskin.membrane.calibration import Calibration
@@ -328,25 +326,18 @@ class AsyncSkin:
         bubbles: Iterable[int] | int | None = None,
         *,
         save: bool = True,
-        board: "str | Path | None" = None,
+        board: str | os.PathLike[str] | None = None,
         progress: "CalibrateProgress | None" = None,
     ) -> "SelfCalibration":
         """See `Skin.calibrate`."""
         from bubbleskin.calibrate import session
 
-        checks.flag("save", save)
-        found = await session.calibrate(self, bubbles, board, progress)
-        if found.accepted:
-            await session.upload(self, found, save)
-        return found
+        return await session.calibrate(self, bubbles, save, board, progress)
 
     async def upload_calibration(self, calibration: "SelfCalibration", save: bool = False) -> None:
         """See `Skin.upload_calibration`."""
         from bubbleskin.calibrate import session
-        from bubbleskin.calibrate.result import SelfCalibration
 
-        checks.instance("calibration", calibration, SelfCalibration, "what `calibrate` or `SelfCalibration.load` returns")
-        checks.flag("save", save)
         await session.upload(self, calibration, save)
 
     async def save(self) -> StoreInfo:

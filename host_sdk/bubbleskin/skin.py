@@ -23,8 +23,6 @@ from bubbleskin.shape.heightfield import Heights
 from bubbleskin.telemetry.recording import Recording
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from bubbleskin.calibrate.measure import Progress as CalibrateProgress
     from bubbleskin.calibrate.result import SelfCalibration
     from bubbleskin.membrane.calibration import Calibration
@@ -263,7 +261,7 @@ class Skin:
         bubbles: Iterable[int] | int | None = None,
         *,
         save: bool = True,
-        board: "str | Path | None" = None,
+        board: str | os.PathLike[str] | None = None,
         progress: "CalibrateProgress | None" = None,
     ) -> "SelfCalibration":
         """Let the wristband measure itself with its own sensors, and use what is found.

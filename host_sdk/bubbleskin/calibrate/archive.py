@@ -37,7 +37,9 @@ class Read(NamedTuple):
     measured: Measured
 
 
-def text(board: str, nominal: Nominal, atmosphere_kpa: float, zero_counts: tuple[int, ...], measured: Measured, found: Any) -> str:
+def text(
+    board: str, nominal: Nominal, atmosphere_kpa: float, zero_counts: tuple[int, ...], measured: Measured, found: Any
+) -> str:
     """The file's text; `found` is for people."""
     head = {
         "bubbleskin_calibration": VERSION,
@@ -108,7 +110,7 @@ def _nominal(tree: Any) -> Nominal:
     values = {key: checks.number(key, value, 1e-6, 1e9) for key, value in tree.items()}
     if not values["rest_mm"] < values["height_max_mm"] or not values["critical_ratio"] < 1.0:
         raise InvalidInput("nominal is of no board: heights rise from rest, and a critical ratio is below 1.")
-    return Nominal(**values | {"zero_counts": checks.whole("zero_counts", tree["zero_counts"], 0, 65535)})
+    return Nominal(**values)
 
 
 def _trace(tree: Any, count: int) -> Trace:
@@ -117,7 +119,9 @@ def _trace(tree: Any, count: int) -> Trace:
     bubbles = tuple(checks.whole("bubbles", one, 0, count - 1) for one in _list("bubbles", tree["bubbles"], count))
     ticks = len(_list("supply_pa", tree["supply_pa"], _TICKS_MOST))
     if ticks < _TICKS_LEAST or not bubbles:
-        raise InvalidInput(f"a trace has {len(bubbles)} bubbles and {ticks} readings; one and {_TICKS_LEAST} are the least.")
+        raise InvalidInput(
+            f"a trace has {len(bubbles)} bubbles and {ticks} readings; one and {_TICKS_LEAST} are the least."
+        )
     signals = {
         name: _numbers(name, tree[name], (len(bubbles), ticks), -_PA_MOST, _US_MOST if "us" in name else _PA_MOST).T
         for name in _SIGNALS

@@ -80,7 +80,7 @@ def figures(estimate: Estimate, zero_pa: float, zero_counts: int, nominal: Nomin
 
 
 def line_share(estimate: Estimate, nominal: Nominal, atmosphere_pa: float) -> float:
-    """By what flows are scaled: least squares of heights, over `USED_MM`, of air with the board's line against that with its own."""
+    """By what flows are scaled: air with the board's line against that with its own, least squares of heights over `USED_MM`."""
     values = estimate.values
     height = np.linspace(*USED_MM, 60)
     pressure = 1e-3 * (atmosphere_pa + estimate.curve(height))

@@ -80,4 +80,3 @@ def groups(layout: Layout, bubbles: Iterable[int]) -> list[list[int]]:
         else:
             found.append([bubble])
     return [sorted(group) for group in found]
-

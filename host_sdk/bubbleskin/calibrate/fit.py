@@ -143,7 +143,8 @@ def fit(data: Data, nominal: Nominal, flow: tuple[float, float] | None = None) -
         expected, height = model(values, data)
         spread = 1.48 * float(np.median(np.abs(measured - expected)))
         off = float(np.clip(_CORRELATED * spread, *_MODEL_PA[1:]))
-    covariance = np.linalg.pinv(solved.jac.T @ solved.jac)
+    slopes = np.asarray(solved.jac)
+    covariance = np.linalg.pinv(slopes.T @ slopes)
     return Estimate(
         values=values,
         covariance=covariance,

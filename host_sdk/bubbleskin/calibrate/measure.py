@@ -88,9 +88,10 @@ async def measure(skin: Wristband, bubbles: Sequence[int], progress: Progress | 
         rest = await _run(skin, [], [Step(0.0, excite.REST_S, True)])
         first = rest[0].time
         zero = 1e3 * np.mean([state.pressure_kpa for state in rest], axis=0)
-        traces = []
+        last = rest[-1].time
+        traces: list[Trace] = []
         for group in groups:
-            passed = rest[-1].time - first if not traces else last - first
+            passed = last - first
             tell("stretching and stepping", group)
             plan = list(excite.steps(tick))
             states = await _run(skin, group, plan)
@@ -133,6 +134,8 @@ async def _run(skin: Wristband, group: Sequence[int], plan: Sequence[Step]) -> l
             if np.abs(wanted - asked).max() > _MOVED_MM:
                 await skin.show(wanted, wait=False)
                 asked = wanted
-        raise LinkError("The wristband's telemetry has ended in the middle of a calibration; connect again and repeat it.")
+        raise LinkError(
+            "The wristband's telemetry has ended in the middle of a calibration; connect again and repeat it."
+        )
     finally:
         await telemetry.aclose()

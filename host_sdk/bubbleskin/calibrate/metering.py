@@ -1,6 +1,6 @@
 """How much air has gone into a bubble and out, from what telemetry says: a sum over pulses, linear in what is unknown.
 
-Flow through a restrictor follows ISO 6358 below the critical ratio b: ṁRT ~ √((p₁ − p₂)(p₂ + (1 − 2b) p₁)). Pressures at both ends
+Flow through a restrictor follows ISO 6358 below the critical ratio b: ṁRT ~ √((p₁ − p₂)(p₂ + (1 − 2b) p₁)). Both pressures
 are measured while air flows; where a reading falls into no pulse, what tube and rubber hold back while air flows, the *lift*, is
 added to it. It stands here for itself, apart from the firmware and from the simulated plant.
 """

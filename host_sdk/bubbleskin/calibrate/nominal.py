@@ -22,7 +22,7 @@ class Nominal(NamedTuple):
     height_max_mm: float
     pressure_max_pa: float
     air_max_uj: float
-    zero_counts: int
+    zero_counts: float
     pa_per_count: float
 
     @classmethod
@@ -40,7 +40,7 @@ class Nominal(NamedTuple):
             height_max_mm=board.HEIGHT_MAX_UM * 1e-3,
             pressure_max_pa=float(board.PRESSURE_MAX_PA),
             air_max_uj=float(board.AIR_MAX_UJ),
-            zero_counts=board.SENSOR_ZERO,
+            zero_counts=float(board.SENSOR_ZERO),
             pa_per_count=float(board.SENSOR_PA_PER_COUNT),
         )
 

@@ -1,9 +1,9 @@
 """A calibration from beginning to end: measure, fit, and let the wristband use what was found."""
 
 import asyncio
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from bubbleskin.device.info import Info
 from bubbleskin.device.settings import Setting
 from bubbleskin.device.trim import Trim
 from bubbleskin.errors import InvalidInput
+from bubbleskin.files import path_of
 
 if TYPE_CHECKING:
     from bubbleskin.membrane.table import Table
@@ -46,9 +47,14 @@ class Calibrated(Wristband, Protocol):
 
 
 async def calibrate(
-    skin: Calibrated, bubbles: Iterable[int] | int | None, board: str | Path | None, progress: Progress | None
+    skin: Calibrated,
+    bubbles: Iterable[int] | int | None,
+    save: bool,
+    board: str | os.PathLike[str] | None,
+    progress: Progress | None,
 ) -> SelfCalibration:
-    """Measure and fit; nothing of the wristband is changed."""
+    """Measure, fit, and upload what is accepted: until then nothing of the wristband is changed."""
+    checks.flag("save", save)
     if not skin.info.tells_sd:
         raise InvalidInput(
             f"Firmware {skin.info.firmware} has one figure for both valves, which is too few; update it with `bubbleskin flash`."
@@ -58,13 +64,16 @@ async def calibrate(
         raise InvalidInput(
             f"progress is {checks.shown(progress)}; give a function of one CalibrationProgress, or None."
         )
-    nominal = Nominal.of(boards.load(skin.info.board if board is None else board))
+    nominal = Nominal.of(boards.load(skin.info.board if board is None else path_of(board, "the board")))
     atmosphere_kpa = (await skin.settings())["atmosphere_kpa"].value
     zeros = tuple(int(zero) for zero in (await skin.trim()).zero)
     measured = await measure(skin, chosen, progress)
     if progress:
         progress(CalibrationProgress("fitting", tuple(chosen), 1.0))
-    return await _aside(lambda: SelfCalibration.of(skin.info.board, nominal, measured, atmosphere_kpa, zeros))
+    found = await _aside(lambda: SelfCalibration.of(skin.info.board, nominal, measured, atmosphere_kpa, zeros))
+    if found.accepted:
+        await upload(skin, found, save)
+    return found
 
 
 def which(bubbles: Iterable[int] | int | None, count: int) -> list[int]:
@@ -80,6 +89,8 @@ def which(bubbles: Iterable[int] | int | None, count: int) -> list[int]:
 
 async def upload(skin: Calibrated, calibration: SelfCalibration, save: bool) -> None:
     """Let the wristband use the figures of all bubbles that were accepted; of the others it keeps what it has."""
+    checks.instance("calibration", calibration, SelfCalibration, "what `calibrate` or `SelfCalibration.load` returns")
+    checks.flag("save", save)
     if not calibration.accepted:
         raise InvalidInput("No bubble of this calibration was accepted; its report says what to do.")
     tables, trim = merged(calibration, skin.info, await skin.read_tables(), await skin.trim())

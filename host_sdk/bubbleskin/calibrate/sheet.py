@@ -32,7 +32,9 @@ def estimate(
     enough = {bubble: one for bubble, one in data.items() if len(one.first) >= MEANS_LEAST}
     alone = {bubble: fits.fit(one, nominal) for bubble, one in enough.items()}
     flows = _told_by_others(traces, data, alone)
-    return {bubble: fits.fit(data[bubble], nominal, flows[bubble]) if flows else one for bubble, one in alone.items()}, data
+    return {
+        bubble: fits.fit(data[bubble], nominal, flows[bubble]) if flows else one for bubble, one in alone.items()
+    }, data
 
 
 def _told_by_others(

@@ -92,36 +92,51 @@ def leak_share(estimate: Estimate) -> float:
 def _not_measured(bubble: int, trace: Trace, estimate: Estimate | None) -> list[tuple[str, str]]:
     found = []
     if faults := trace.faults.get(bubble):
-        found.append(("faulted", f"It reported {', '.join(faults)} on its way: see `fault_log()`, clear it and repeat."))
+        found.append(
+            ("faulted", f"It reported {', '.join(faults)} on its way: see `fault_log()`, clear it and repeat.")
+        )
     if trace.lost:
         found.append(("lost telemetry", f"{trace.lost} readings have not come: look at the link's cable and repeat."))
     if estimate is None:
         found.append(("too little data", "Its line was quiet too seldom to measure: look whether it rises at all."))
     elif estimate.largest_mm < HEIGHT_LEAST_MM:
-        found.append(("too little data", f"It rose to {estimate.largest_mm:.1f} mm only: see the supply in `health()`."))
+        found.append(
+            ("too little data", f"It rose to {estimate.largest_mm:.1f} mm only: see the supply in `health()`.")
+        )
     elif chi(estimate) > CHI_MOST:
-        found.append(("bad fit", f"Its pressures are {estimate.rms_pa:.0f} Pa off every rubber: leave it alone and repeat."))
+        found.append(
+            ("bad fit", f"Its pressures are {estimate.rms_pa:.0f} Pa off every rubber: leave it alone and repeat.")
+        )
     return found
 
 
-def _odd(
-    bubble: int, estimate: Estimate, estimates: Mapping[int, Estimate], nominal: Nominal
-) -> list[tuple[str, str]]:
+def _odd(bubble: int, estimate: Estimate, estimates: Mapping[int, Estimate], nominal: Nominal) -> list[tuple[str, str]]:
     found = []
     v, sd = estimate.values, estimate.sd
     leak = leak_share(estimate)
     if leak > LEAK_SHARE and v[LEAK] > LEAK_SURE * sd[LEAK]:
-        found.append(("leaking", f"At 12 mm it loses {100 * leak:.1f} % of its air a second: look at barb, tube and rubber."))
+        found.append(
+            ("leaking", f"At 12 mm it loses {100 * leak:.1f} % of its air a second: look at barb, tube and rubber.")
+        )
     if estimate.lift > LIFT_MOST:
         times = estimate.lift / LIFT_MOST * 2.0
         found.append(("kinked tube", f"Its tube resists {times:.1f} times as usual: straighten it, or look for dirt."))
     for name, at in (("fill", FILL), ("vent", VENT)):
         if not 1.0 / FLOW_MOST < v[at] < FLOW_MOST:
-            found.append(("restrictor", f"Its {name} valve lets {v[at]:.2f} times the usual through: look for dirt in it."))
+            found.append(
+                ("restrictor", f"Its {name} valve lets {v[at]:.2f} times the usual through: look for dirt in it.")
+            )
     stiffness = {key: float(one.values[MU] / one.values[RADIUS]) for key, one in estimates.items()}
     share = stiffness[bubble] / float(np.median(list(stiffness.values())))
     if not 1.0 / STIFFNESS_MOST < share < STIFFNESS_MOST:
-        found.append(("wrong bubble", f"It is {share:.2f} times as stiff as the middle one of its sheet: look which it is."))
+        found.append(
+            ("wrong bubble", f"It is {share:.2f} times as stiff as the middle one of its sheet: look which it is.")
+        )
     if abs(v[RADIUS] / (0.5 * nominal.rest_mm) - 1.0) > RADIUS_MOST:
-        found.append(("wrong bubble", f"At rest it is {2 * v[RADIUS]:.2f} mm high and not {nominal.rest_mm:g}: look which it is."))
+        found.append(
+            (
+                "wrong bubble",
+                f"At rest it is {2 * v[RADIUS]:.2f} mm high and not {nominal.rest_mm:g}: look which it is.",
+            )
+        )
     return found

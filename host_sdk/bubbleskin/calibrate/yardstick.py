@@ -54,18 +54,14 @@ def compare(draws: Sequence[Draw]) -> Flows:
         found, *_ = np.linalg.lstsq(basis, measured, rcond=None)
         return basis, found, measured - basis @ found
 
-    start = np.array([0.0, 0.0])
-    best = least_squares(
-        lambda at: solve(top + _BAND_PA * at[0], _HEAT_S * np.exp(at[1]))[2],
-        start,
-        bounds=([-1.0, -1.0], [1.0, 1.0]),
-        diff_step=1e-3,
-    )
-    basis, found, off = solve(top + _BAND_PA * best.x[0], _HEAT_S * float(np.exp(best.x[1])))
-    spread = float(np.mean(off**2))
-    covariance = spread * np.linalg.pinv(basis.T @ basis)
+    def left(at: Floats) -> Floats:
+        return solve(top + _BAND_PA * float(at[0]), _HEAT_S * float(np.exp(at[1])))[2]
+
+    best = least_squares(left, np.zeros(2), bounds=([-1.0, -1.0], [1.0, 1.0]), diff_step=np.full(2, 1e-3)).x
+    basis, found, off = solve(top + _BAND_PA * float(best[0]), _HEAT_S * float(np.exp(best[1])))
+    covariance = float(np.mean(off**2)) * np.linalg.pinv(basis.T @ basis)
     n = len(bubbles)
-    return Flows(bubbles, -found[:n], covariance[:n, :n])
+    return Flows(bubbles, -found[:n], np.asarray(covariance[:n, :n], float))
 
 
 def _basis(draws: Sequence[Draw], bubbles: Sequence[int], threshold: float, heat_s: float) -> Floats:

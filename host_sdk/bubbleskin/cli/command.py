@@ -9,7 +9,21 @@ from typing import Any
 
 import click
 
-from bubbleskin.cli import bench, device, doctor, firmware, flash, membrane, monitor, plan, play, plot, sim, store
+from bubbleskin.cli import (
+    bench,
+    calibrate,
+    device,
+    doctor,
+    firmware,
+    flash,
+    membrane,
+    monitor,
+    plan,
+    play,
+    plot,
+    sim,
+    store,
+)
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
 LOG = "BUBBLESKIN_LOG"
@@ -32,6 +46,7 @@ for _command in (
     *store.commands,
     *sim.commands,
     *membrane.commands,
+    *calibrate.commands,
     *plot.commands,
     *bench.commands,
     *firmware.commands,
