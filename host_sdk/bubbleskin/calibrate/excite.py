@@ -20,12 +20,14 @@ BEFORE_S = 0.15
 STRETCH_MM = (8.0, 10.5, 12.0, 12.6)
 STRETCH_S = 0.15
 TOP_MM, TOP_S = 13.1, 0.35
-DOWN_MM = (11.6, 10.2, 8.8, 7.5, 6.5, 5.8)
-DOWN_S = 0.27
-LOW_S = 1.0
-"""Of the last step down: where pressure is steep, a leak shows most."""
-UP_MM = (6.2, 6.7, 7.3, 8.0, 8.8, 9.7, 10.6, 11.5, 12.3, 13.0)
-UP_S = 0.21
+DOWN_MM = (11.6, 10.2, 8.8, 7.5, 6.5)
+DOWN_S = 0.25
+EMPTY_S = 0.45
+"""Between both ways: its air is known anew, and the steep beginning of the curve is filled from rest, where little can be off."""
+LOW_MM, LOW_S = 6.0, 0.8
+"""The step that is held longer: where pressure is steep, a leak shows most."""
+UP_MM = (5.6, LOW_MM, 6.5, 7.1, 7.8, 8.6, 9.5, 10.5, 11.5, 12.3, 13.0)
+UP_S = 0.20
 SLOWER = 1.8
 """By what all this takes longer where a tick is longer than `QUICK_TICK_S`: two readings make one of theirs."""
 QUICK_TICK_S = 0.0075
@@ -49,11 +51,11 @@ def steps(tick_s: float) -> Iterator[Step]:
     for height in STRETCH_MM:
         yield Step(height, times * STRETCH_S, True)
     yield Step(TOP_MM, times * TOP_S, True)
-    for height in DOWN_MM[:-1]:
+    for height in DOWN_MM:
         yield Step(height, times * DOWN_S, False)
-    yield Step(DOWN_MM[-1], times * LOW_S, False)
+    yield Step(0.0, EMPTY_S, False)
     for height in UP_MM:
-        yield Step(height, times * UP_S, False)
+        yield Step(height, times * (LOW_S if height == LOW_MM else UP_S), False)
 
 
 def phase(bubbles: int, tick_s: float) -> float:
