@@ -31,6 +31,7 @@ _LATE_MS = 0.25
 _LINE_SHARE = 0.085
 _RADIUS_SHARE = 0.012
 _STIFFNESS = (40.0, 0.4, 0.06)  # Pa m, within half and twice of which every silicone for this is
+_USUAL_PA = 21e3  # what a bubble of that has on most of its way
 _STIFFNESS_SHARE = (0.6, 1.0, 1.0)
 _SOFTENING, _SOFTENING_SD = 0.08, 0.06
 _MEMORY, _MEMORY_SD = 0.05, 0.03
@@ -124,11 +125,13 @@ def fit(data: Data, nominal: Nominal, flow: tuple[float, float] | None = None) -
     There must be `MEANS_LEAST` means.
     """
     prior, prior_sd = beforehand(nominal)
+    measured = data.mean(data.pressure)
+    for k in (MU, C2, C3):
+        prior[k] *= float(np.median(measured)) / _USUAL_PA
     if flow is not None:
         prior[FILL], prior_sd[FILL] = _together((prior[FILL], prior_sd[FILL]), flow)
     low = np.full(len(prior), -np.inf)
     low[list(_NOT_BELOW_ZERO)] = 0.0
-    measured = data.mean(data.pressure)
     values = prior.copy()
     off = _MODEL_PA[0]
     for _ in range(3):

@@ -72,12 +72,14 @@ class SelfCalibration:
     ) -> Self:
         """Fit everything."""
         atmosphere = 1e3 * atmosphere_kpa
-        estimates, _ = estimate_sheet(measured.traces, measured.zero_pa, atmosphere, nominal)
+        estimates, data = estimate_sheet(measured.traces, measured.zero_pa, atmosphere, nominal)
         found = []
+        faulted = sum(len(trace.faults) for trace in measured.traces)
         for trace in measured.traces:
             for bubble in trace.bubbles:
                 zero = float(measured.zero_pa[bubble])
-                said = verdict.judge(bubble, trace, zero, estimates, nominal)
+                said = verdict.of_other_rubber(bubble, trace, faulted, len(data))
+                said = said or verdict.judge(bubble, trace, data[bubble].lift, zero, estimates, nominal)
                 one = estimates.get(bubble)
                 used = (
                     device.figures(one, zero, zero_counts[bubble], nominal, atmosphere)

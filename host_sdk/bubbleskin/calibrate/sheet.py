@@ -30,11 +30,22 @@ def estimate(
         for bubble in trace.bubbles
     }
     enough = {bubble: one for bubble, one in data.items() if len(one.first) >= MEANS_LEAST}
-    alone = {bubble: fits.fit(one, nominal) for bubble, one in enough.items()}
+    alone = {bubble: found for bubble, one in enough.items() if (found := _fitted(one, nominal, None))}
     flows = _told_by_others(traces, data, alone)
-    return {
-        bubble: fits.fit(data[bubble], nominal, flows[bubble]) if flows else one for bubble, one in alone.items()
-    }, data
+    if not flows:
+        return alone, data
+    again = {bubble: _fitted(data[bubble], nominal, flows[bubble]) for bubble in alone}
+    return {bubble: one for bubble, one in again.items() if one}, data
+
+
+def _fitted(data: Data, nominal: Nominal, flow: tuple[float, float] | None) -> Estimate | None:
+    """A fit; None where data is of no bubble at all, and numbers run out of bounds."""
+    try:
+        with np.errstate(all="ignore"):
+            found = fits.fit(data, nominal, flow)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    return found if np.isfinite(found.values).all() and np.isfinite(found.covariance).all() else None
 
 
 def _told_by_others(

@@ -1,12 +1,12 @@
 """Whether what was found of a bubble can be used, and if not, what is wrong: each a name and a sentence."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.calibrate.fit import FILL, LEAK, MU, RADIUS, VENT, Estimate
+from bubbleskin.calibrate.fit import FILL, LEAK, RADIUS, VENT, Estimate
 from bubbleskin.calibrate.nominal import Nominal
 from bubbleskin.calibrate.trace import SOME_PA, Trace
 
@@ -22,11 +22,14 @@ LEAK_UNIT = 53.0
 LEAK_SHARE = 0.004
 """Of its air a second, of a bubble at 12 mm: what silicone lets through is a twentieth of this."""
 LEAK_SURE = 4.0
-LIFT_MOST = 14.0
-"""Pa per µJ/ms: twice what a whole tube and rubber make. Half the bore makes sixteen times the resistance."""
+LIFT_USUAL, LIFT_MOST = 7.0, 14.0
+"""Pa per µJ/ms, of a whole tube and rubber, and the most. Half the bore makes sixteen times the resistance."""
 FLOW_MOST = 1.25
 STIFFNESS_MOST = 1.35
 """Of the middle one's of its sheet: walls and rubber of one sheet differ by a fifth."""
+COMPARED_MM = 9.0
+COMPARED_LEAST = 3
+"""Bubbles, where one is compared with most others."""
 RADIUS_MOST = 0.04
 HEIGHT_LEAST_MM = 11.0
 ZERO_MOST_PA = 1500.0
@@ -50,18 +53,43 @@ class Verdict:
         return self.verdict == ACCEPTED
 
 
+_BY_FAULT = {
+    "leak": ("leaking", "It lost its air faster than it could be measured: look at barb, tube and rubber."),
+    "overpressure": (
+        "kinked tube",
+        "Its pressure went beyond the limit while it filled: its tube is kinked or blocked, or it is a much stiffer bubble.",
+    ),
+}
+_OTHER_RUBBER = Verdict(
+    REDO,
+    ("other rubber",),
+    "It reported {}, as most others did: the sheet is of another rubber than the tables. Upload tables that are nearer, such as "
+    "`bubbleskin table --preset ecoflex-00-30 --upload`, and repeat.",
+)
+
+
+def of_other_rubber(bubble: int, trace: Trace, faulted: int, all_of_them: int) -> Verdict | None:
+    """The verdict on a bubble that faulted as more than half of `all_of_them` did: tables far from the rubber, not bubbles, are
+    what that comes from.
+    """
+    faults = trace.faults.get(bubble)
+    if not faults or all_of_them < COMPARED_LEAST or 2 * faulted <= all_of_them:
+        return None
+    return replace(_OTHER_RUBBER, advice=_OTHER_RUBBER.advice.format(", ".join(faults)))
+
+
 def judge(
-    bubble: int,
-    trace: Trace,
-    zero_pa: float,
-    estimates: Mapping[int, Estimate],
-    nominal: Nominal,
+    bubble: int, trace: Trace, lift: float, zero_pa: float, estimates: Mapping[int, Estimate], nominal: Nominal
 ) -> Verdict:
-    """The verdict on one bubble among those that were fitted."""
+    """The verdict on one bubble among those that were fitted; `lift` is its line's."""
     redo = _not_measured(bubble, trace, estimates.get(bubble))
     odd: list[tuple[str, str]] = []
     if abs(zero_pa) > ZERO_MOST_PA:
         odd.append(("sensor zero", f"Its sensor says {zero_pa / 1e3:.2f} kPa without pressure: replace it."))
+    odd += [_BY_FAULT[fault] for fault in trace.faults.get(bubble, ()) if fault in _BY_FAULT]
+    if lift > LIFT_MOST:
+        times = lift / LIFT_USUAL
+        odd.append(("kinked tube", f"Its tube holds back {times:.0f} times as much as usual: straighten it, or look for dirt."))
     if (estimate := estimates.get(bubble)) is not None:
         odd += _odd(bubble, estimate, estimates, nominal)
     for other, pressure in trace.others_pa.items():
@@ -118,16 +146,13 @@ def _odd(bubble: int, estimate: Estimate, estimates: Mapping[int, Estimate], nom
         found.append(
             ("leaking", f"At 12 mm it loses {100 * leak:.1f} % of its air a second: look at barb, tube and rubber.")
         )
-    if estimate.lift > LIFT_MOST:
-        times = estimate.lift / LIFT_MOST * 2.0
-        found.append(("kinked tube", f"Its tube resists {times:.1f} times as usual: straighten it, or look for dirt."))
     for name, at in (("fill", FILL), ("vent", VENT)):
         if not 1.0 / FLOW_MOST < v[at] < FLOW_MOST:
             found.append(
                 ("restrictor", f"Its {name} valve lets {v[at]:.2f} times the usual through: look for dirt in it.")
             )
-    stiffness = {key: float(one.values[MU] / one.values[RADIUS]) for key, one in estimates.items()}
-    share = stiffness[bubble] / float(np.median(list(stiffness.values())))
+    held = {key: float(one.curve(np.array([COMPARED_MM]))[0]) for key, one in estimates.items()}
+    share = held[bubble] / float(np.median(list(held.values())))
     if not 1.0 / STIFFNESS_MOST < share < STIFFNESS_MOST:
         found.append(
             ("wrong bubble", f"It is {share:.2f} times as stiff as the middle one of its sheet: look which it is.")
