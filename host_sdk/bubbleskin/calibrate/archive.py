@@ -18,7 +18,7 @@ from bubbleskin.errors import InvalidInput
 
 Floats = NDArray[np.float64]
 
-VERSION = 1
+FORMAT = 1
 _WHAT = "the calibration"
 _TICKS_LEAST, _TICKS_MOST = 8, 20_000
 _TRACES_MOST = 32
@@ -42,7 +42,7 @@ def text(
 ) -> str:
     """The file's text; `found` is for people."""
     head = {
-        "bubbleskin_calibration": VERSION,
+        "bubbleskin_calibration": FORMAT,
         "board": board,
         "atmosphere_kpa": atmosphere_kpa,
         "zero_counts": list(zero_counts),
@@ -74,7 +74,7 @@ def read(path: str | Path) -> Read:
     """What `text` made; `InvalidInput` says where a file is wrong."""
     name = f"The calibration {path}"
     tree = files.parse_json(files.read_text(path, _WHAT), name)
-    if not isinstance(tree, dict) or tree.get("bubbleskin_calibration") != VERSION:
+    if not isinstance(tree, dict) or tree.get("bubbleskin_calibration") != FORMAT:
         raise InvalidInput(f"{name} is none of this version; make it with `bubbleskin calibrate --output FILE`.")
     try:
         return _read(tree)

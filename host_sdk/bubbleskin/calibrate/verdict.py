@@ -19,7 +19,7 @@ GOOD_PA = 60.0
 CHI_MOST = 4.0
 LEAK_UNIT = 53.0
 """µJ/(s kPa) with which a bubble of 12 mm loses 1 % of its air in a second."""
-LEAK_SHARE = 0.004
+LEAK_MOST = 0.004
 """Of its air a second, of a bubble at 12 mm: what silicone lets through is a twentieth of this."""
 LEAK_SURE = 4.0
 LIFT_USUAL, LIFT_MOST = 7.0, 14.0
@@ -142,7 +142,7 @@ def _odd(bubble: int, estimate: Estimate, estimates: Mapping[int, Estimate], nom
     found = []
     v, sd = estimate.values, estimate.sd
     leak = leak_share(estimate)
-    if leak > LEAK_SHARE and v[LEAK] > LEAK_SURE * sd[LEAK]:
+    if leak > LEAK_MOST and v[LEAK] > LEAK_SURE * sd[LEAK]:
         found.append(
             ("leaking", f"At 12 mm it loses {100 * leak:.1f} % of its air a second: look at barb, tube and rubber.")
         )
