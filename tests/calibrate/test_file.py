@@ -3,6 +3,7 @@
 import contextlib
 import json
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,7 +48,8 @@ def test_a_file_is_fitted_again(done, path):
     again = bs.SelfCalibration.load(path)
     assert again.accepted == done.calibration.accepted
     for one, before in zip(again.bubbles, done.calibration.bubbles, strict=True):
-        assert one.estimate.values == pytest.approx(before.estimate.values, rel=0.02, abs=0.02)
+        # Pressures that were interpolated are rounded in the file, and zeros to a thousandth.
+        assert (np.abs(one.estimate.values - before.estimate.values) < 0.1 * before.estimate.sd).all()
 
 
 def test_people_can_read_what_was_found(path):

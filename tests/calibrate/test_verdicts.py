@@ -16,8 +16,9 @@ def said(done, trace_changed=(), lift=7.0, zero=0.0):
     """The verdict on bubble 3 of the sheet, its trace changed."""
     trace = next(trace for trace in done.calibration.measured.traces if ODD in trace.bubbles)
     trace = Trace(**vars(trace) | dict(trace_changed))
+    lifts = dict.fromkeys(range(7), 7.0) | {ODD: lift}
     estimates = {each.bubble: each.estimate for each in done.calibration.bubbles}
-    return verdict.judge(ODD, trace, lift, zero, estimates, NOMINAL)
+    return verdict.judge(ODD, trace, lifts, zero, estimates, NOMINAL)
 
 
 def test_nothing_is_wrong(done):

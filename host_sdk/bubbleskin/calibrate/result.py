@@ -73,13 +73,14 @@ class SelfCalibration:
         """Fit everything."""
         atmosphere = 1e3 * atmosphere_kpa
         estimates, data = estimate_sheet(measured.traces, measured.zero_pa, atmosphere, nominal)
+        lifts = {bubble: one.lift for bubble, one in data.items()}
         found = []
         faulted = sum(len(trace.faults) for trace in measured.traces)
         for trace in measured.traces:
             for bubble in trace.bubbles:
                 zero = float(measured.zero_pa[bubble])
                 said = verdict.of_other_rubber(bubble, trace, faulted, len(data))
-                said = said or verdict.judge(bubble, trace, data[bubble].lift, zero, estimates, nominal)
+                said = said or verdict.judge(bubble, trace, lifts, zero, estimates, nominal)
                 one = estimates.get(bubble)
                 used = (
                     device.figures(one, zero, zero_counts[bubble], nominal, atmosphere)

@@ -23,12 +23,15 @@ LEAK_MOST = 0.004
 """Of its air a second, of a bubble at 12 mm: what silicone lets through is a twentieth of this."""
 LEAK_SURE = 4.0
 LIFT_USUAL, LIFT_MOST = 7.0, 14.0
-"""Pa per µJ/ms, of a whole tube and rubber, and the most. Half the bore makes sixteen times the resistance."""
+LIFT_TIMES = 1.6
+"""Pa per µJ/ms, of a whole tube and usual rubber, and the most, where it is so much more than the middle one's: viscous rubber
+holds back as a tube does, but all of a sheet. Half the bore makes sixteen times the resistance.
+"""
 FLOW_MOST = 1.25
 STIFFNESS_MOST = 1.35
 """Of the middle one's of its sheet: walls and rubber of one sheet differ by a fifth."""
 COMPARED_MM = 9.0
-COMPARED_LEAST = 3
+ENOUGH = 3
 """Bubbles, where one is compared with most others."""
 RADIUS_MOST = 0.04
 HEIGHT_LEAST_MM = 11.0
@@ -73,23 +76,30 @@ def of_other_rubber(bubble: int, trace: Trace, faulted: int, all_of_them: int) -
     what that comes from.
     """
     faults = trace.faults.get(bubble)
-    if not faults or all_of_them < COMPARED_LEAST or 2 * faulted <= all_of_them:
+    if not faults or all_of_them < ENOUGH or 2 * faulted <= all_of_them:
         return None
     return replace(_OTHER_RUBBER, advice=_OTHER_RUBBER.advice.format(", ".join(faults)))
 
 
 def judge(
-    bubble: int, trace: Trace, lift: float, zero_pa: float, estimates: Mapping[int, Estimate], nominal: Nominal
+    bubble: int,
+    trace: Trace,
+    lifts: Mapping[int, float],
+    zero_pa: float,
+    estimates: Mapping[int, Estimate],
+    nominal: Nominal,
 ) -> Verdict:
-    """The verdict on one bubble among those that were fitted; `lift` is its line's."""
+    """The verdict on one bubble among those that were fitted; `lifts` are those of all lines."""
     redo = _not_measured(bubble, trace, estimates.get(bubble))
     odd: list[tuple[str, str]] = []
     if abs(zero_pa) > ZERO_MOST_PA:
         odd.append(("sensor zero", f"Its sensor says {zero_pa / 1e3:.2f} kPa without pressure: replace it."))
     odd += [_BY_FAULT[fault] for fault in trace.faults.get(bubble, ()) if fault in _BY_FAULT]
-    if lift > LIFT_MOST:
-        times = lift / LIFT_USUAL
-        odd.append(("kinked tube", f"Its tube holds back {times:.0f} times as much as usual: straighten it, or look for dirt."))
+    usual = float(np.median(list(lifts.values()))) if len(lifts) >= ENOUGH else LIFT_USUAL
+    times = lifts[bubble] / usual
+    if lifts[bubble] > LIFT_MOST and times > LIFT_TIMES:
+        said = f"Its tube holds back {times:.1f} times as much as usual: straighten it, or look for dirt."
+        odd.append(("kinked tube", said))
     if (estimate := estimates.get(bubble)) is not None:
         odd += _odd(bubble, estimate, estimates, nominal)
     for other, pressure in trace.others_pa.items():
