@@ -45,6 +45,8 @@ CONNECTIONS, STATES = (0.1, 0.2), (0.01, 0.0)
 """What one may leave: kB, objects."""
 SWING_KB = 512
 CHIP_KB = 20_000
+CHIPS = (0.5, 10.0)
+"""What a whole chip may leave: the emulator makes a logger for each, and `logging` forgets none."""
 
 
 def resident_kb(process: str) -> int:
@@ -187,7 +189,7 @@ def chip_connections(cycles: int) -> bool:
 
 def chip_boots(boots: int) -> bool:
     """To an emulated chip that boots for each."""
-    return measure("rp2040://, booted", boots, lambda: cycle(f"rp2040://{BOARD}"), 2, CONNECTIONS, CHIP_KB)
+    return measure("rp2040://, booted", boots, lambda: cycle(f"rp2040://{BOARD}"), 2, CHIPS, CHIP_KB)
 
 
 def many_states(scheme: str, states: int) -> bool:

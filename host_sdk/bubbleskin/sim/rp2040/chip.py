@@ -62,6 +62,10 @@ class QuietCdc(USBCDC):
         self._asked = 0
 
 
+_LOGGER = ConsoleLogger(LogLevel.ERROR)
+"""One for all chips: `logging` forgets none, and the emulator gives each a name of its own."""
+
+
 class Chip:
     """An RP2040 that starts from the UF2 at `path`, or from what is in `flash`, when it is first run.
 
@@ -73,7 +77,7 @@ class Chip:
     def __init__(self, path: Path | None, flash: bytes | bytearray = b""):
         self.mcu = RP2040()
         self.mcu.load_bootrom(BOOTROM_B1)
-        self.mcu.logger = ConsoleLogger(LogLevel.ERROR)
+        self.mcu.logger = _LOGGER
         self.mcu.flash[: len(flash)] = flash
         if path:
             load_uf2(path, self.mcu)
