@@ -1,4 +1,4 @@
-"""The protocol's data as a stock MicroPython gets it: smaller, and the same schema."""
+"""The firmware's data as a stock MicroPython gets it: smaller, and the same schema."""
 
 import subprocess
 import sys
@@ -22,13 +22,15 @@ def test_texts_and_what_nobody_asks_for_are_left_out():
         "bubble_protocol/data.py": DATA,
         "bubble_protocol/kinds.py": b"U8, U16 = 1, 2\n",
         "bubble_firmware/app.py": CODE,
-        "bubble_firmware/nominal.py": b"UNUSED = 'a text'\n",
+        "bubble_firmware/nominal.py": b"UNUSED = 'a text'\nTHREE = 3\n",
+        "bubble_firmware/mixed.py": b"SAID = 'a text'\nprint(SAID)\n",
     }
     assert lean(sources) == {
         "bubble_protocol/data.py": b"from bubble_protocol.kinds import U8\nTWO = 2\nFIELDS = (('height_um', U8, ''),)",
         "bubble_protocol/kinds.py": b"U8 = 1",
         "bubble_firmware/app.py": CODE,
-        "bubble_firmware/nominal.py": b"UNUSED = 'a text'\n",
+        "bubble_firmware/nominal.py": b"",
+        "bubble_firmware/mixed.py": b"SAID = 'a text'\nprint(SAID)\n",
     }
 
 

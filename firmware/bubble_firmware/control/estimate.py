@@ -267,7 +267,13 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 else:
                     segment = row[_FIRST_SEGMENT]
                     knot = ptr32(uint(curves) + segment)
+                    off = air
                     air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] >> 12
+                    off -= air
+                    # What was learned of the curve at an air that was not there is wrong, too.
+                    if 2 * row[_AIR_SD] - off >> 31 | 2 * row[_AIR_SD] + off >> 31:
+                        row[_CURVE_ERROR] = 0
+                        row[_CURVE_ERROR_SD] = row[_CURVE_SD]
                     row[_AIR_SD] = _AIR_SD_EMPTY
                     row[_REZERO] = 0
                     row[_LEAKED] = 0

@@ -255,7 +255,10 @@ def correct(row: ptr32, board: ptr32, bubble: int):
         row[_DWELL_SLOPE] = 0
     else:
         gain = air_sd * u // (v >> 8)
-        air = row[_AIR] + (gain * r >> 8)
+        air = gain * r >> 8
+        if air > _AIR_SD_MAX:  # more in one step would be taken for air from a valve that is stuck
+            air = _AIR_SD_MAX
+        air += row[_AIR]
         row[_AIR] = air if air > 0 else 0
         gain = sd * w // (v >> 8)
         error += gain * r >> 8

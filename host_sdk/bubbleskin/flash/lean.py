@@ -1,23 +1,22 @@
-"""The protocol's data without what only people read: on a stock MicroPython our code and its strings are on the heap.
+"""The firmware's data without what only people read: on a stock MicroPython our code and its strings are on the heap.
 
 A UF2 has them in flash, where they cost no memory. As files the schema's texts, and names that nothing on the board
-asks for, take as much heap as the state of seven bubbles.
+asks for, take as much heap as the state of nineteen bubbles: where a number stands in a row is a name for every number,
+and the functions that use it have its value.
 """
 
 import ast
 from collections.abc import Iterator
 
-_PACKAGE = "bubble_protocol/"
-
 
 def lean(sources: dict[str, bytes]) -> dict[str, bytes]:
-    """All `sources`, by path; modules of the protocol that are nothing but data without texts and unused names.
+    """All `sources`, by path; modules that are nothing but data without texts and unused names.
 
     A text is a string with a space: names of messages and fields, of which the schema's CRC is taken, have none. A
     name is used where it occurs in any of the sources, whatever module it is meant to be from.
     """
     trees = {path: ast.parse(source) for path, source in sources.items()}
-    data = {path: tree for path, tree in trees.items() if path.startswith(_PACKAGE) and _is_data(tree)}
+    data = {path: tree for path, tree in trees.items() if _is_data(tree)}
     code = [tree for path, tree in trees.items() if path not in data]
     for tree in data.values():
         tree.body = [part for statement in tree.body for part in _apart(statement)]
