@@ -44,9 +44,11 @@ def test_the_schema_stays_the_same_to_the_byte(tmp_path):
         (tmp_path / name).write_bytes(data)
     script = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-        "from bubble_protocol import codec\n"
+        "from bubble_protocol import codec, packing\n"
         f"assert codec.__file__.startswith({str(tmp_path)!r})\n"
         "import bubble_firmware.app, bubble_firmware.boards.wristband19\n"
+        "from bubble_protocol.schema.packed import PACKED\n"
+        "assert len(PACKED) == len(packing.BY_ID) == len(codec.BY_ID)\n"
         "sys.stdout.buffer.write(codec.schema_bytes())\n"
     )
     said = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)

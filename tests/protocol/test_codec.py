@@ -1,15 +1,16 @@
 """The codec against Python's struct, for every message of the schema."""
 
 import struct
+import zlib
 from array import array
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bubble_protocol import codec
+from bubble_protocol import codec, packing
 from bubble_protocol.frame import PAYLOAD_MAX
-from bubble_protocol.schema import messages
+from bubble_protocol.schema import messages, packed
 
 FORMATS = {
     messages.U8: "B",
@@ -99,6 +100,16 @@ def test_fields_that_a_newer_version_has_appended_are_not_read(message):
     exact = array("i", [7] * PAYLOAD_MAX)
     assert message.unpack(payload, 0, message.fixed_size, exact) == 0
     assert values == exact
+
+
+def test_a_device_packs_as_the_schema_says():
+    """Its table is generated; here it is compared with the messages themselves, field by field."""
+    assert list(packing.BY_ID) == list(codec.BY_ID)
+    assert zlib.crc32(codec.schema_bytes()) == packed.SCHEMA_CRC & 0xFFFFFFFF
+    for message_id, message in codec.BY_ID.items():
+        device, host = vars(packing.BY_ID[message_id]), vars(message)
+        assert device == {name: host[name] for name in device}, message.name
+        assert set(host) - set(device) == {"id", "name", "fixed", "repeated", "meaning"}
 
 
 def test_fields_that_an_older_version_does_not_send_are_zero():

@@ -5,10 +5,9 @@ Air is metered: what the valves have brought in the period that ended is the tim
 the flows at its beginning and end, see `flow`. Height follows from air by the gas law: V = A/(p0 + P) - V_line. No membrane is
 in it. What is known of the membrane corrects the air now and then, see `reference`.
 
-A *quiescent* bubble has its limits looked at in every tick, but it is measured and decided upon only when a mean of its quiet
-line is there: of eight readings, later of 32. A *held* bubble is far from where it goes to: its valve stays open for a period
-more, which is not decided upon. Whatever asks something else of a bubble ends both. `DUE` says for the passes that follow
-whether a bubble is decided upon in this tick.
+A *quiescent* bubble has its limits looked at in every tick, but is measured and decided upon only when a mean of its quiet line
+is there: of eight readings, later of 32. A *held* bubble is far from its target: its valve stays open for a period more. Whatever
+asks something else of a bubble ends both. `DUE` says for the passes that follow whether it is decided upon in this tick.
 """
 
 from bubble_protocol.mpy_compat import const, micropython, ptr16, ptr32, uint
@@ -113,9 +112,8 @@ _AIR_SD_FAR = const(20000)
 def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) -> int:
     """Take up this tick's `counts`: pressures, faults of the sensors, and air and height of every bubble that is due.
 
-    `supply` is the reservoir's pressure in Pa. `mode` is what control is to do, see `state_layout`: where it has changed, every
-    bubble is due. Returns the number, from 1, of the bubble whose mean of a quiet line is to be compared with its curve, 0 for
-    none, plus RESTART where `restart` has something to do.
+    `supply` is in Pa. `mode` is what control is to do, see `state_layout`: where it has changed, every bubble is due. Returns
+    the number, from 1, of the bubble whose mean of a quiet line is to be compared with its curve, plus RESTART for `restart`.
     """
     n = board[_BUBBLE_COUNT]
     curves = ptr32(uint(board) + 4 * (_ROWS + _ROW_WORDS * n))
@@ -269,11 +267,10 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                     knot = ptr32(uint(curves) + segment)
                     off = air
                     air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] >> 12
-                    off -= air
                     # What was learned of the curve at an air that was not there is wrong, too.
-                    if 2 * row[_AIR_SD] - off >> 31 | 2 * row[_AIR_SD] + off >> 31:
-                        row[_CURVE_ERROR] = 0
-                        row[_CURVE_ERROR_SD] = row[_CURVE_SD]
+                    off = (2 * row[_AIR_SD] - off + air | 2 * row[_AIR_SD] + off - air) >> 31
+                    row[_CURVE_ERROR] = row[_CURVE_ERROR] & ~off
+                    row[_CURVE_ERROR_SD] = row[_CURVE_ERROR_SD] + (row[_CURVE_SD] - row[_CURVE_ERROR_SD] & off)
                     row[_AIR_SD] = _AIR_SD_EMPTY
                     row[_REZERO] = 0
                     row[_LEAKED] = 0
@@ -369,9 +366,7 @@ def restart(row: ptr32, board: ptr32):
             upwards = 1
             while (pressure - knot[_KNOT_PRESSURE]) * (knot[_KNOT_WORDS + _KNOT_PRESSURE] - pressure) >> 31:
                 if high == row[_LAST_SEGMENT] and low == row[_FIRST_SEGMENT]:  # nowhere
-                    segment = low
-                    if pressure > 0:
-                        segment = high
+                    segment = high if pressure > 0 else low
                     knot = ptr32(uint(curves) + segment)
                     break
                 if (upwards and high != row[_LAST_SEGMENT]) or low == row[_FIRST_SEGMENT]:

@@ -1,10 +1,7 @@
 """Requests that open a session and keep it: HELLO, PING, SUBSCRIBE, SUBSCRIBE_FIELDS."""
 
-from array import array
-
 from bubble_firmware.link.reply import Handlers
-from bubble_protocol import codec
-from bubble_protocol.crc import crc32_on
+from bubble_protocol import packing
 from bubble_protocol.frame import Decoder
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 from bubble_protocol.steps import copy_word
@@ -20,6 +17,7 @@ if TYPE_CHECKING:
     from bubble_firmware.hal.base import Hal
     from bubble_firmware.link.server import Server
 
+# [constants] bubble_protocol.schema.packed: SCHEMA_CRC
 # [constants] bubble_protocol.schema.messages: HELLO PING SUBSCRIBE SUBSCRIBE_FIELDS
 # [constants] bubble_protocol.schema.errors: NO_COMMON_PROTOCOL NO_ELEMENT OUT_OF_RANGE OVERTAKEN
 # [constants] bubble_protocol.schema.system: DELIVERY CAN_CHOOSE_TELEMETRY
@@ -29,6 +27,7 @@ if TYPE_CHECKING:
 # [constants] message PING_REPLY as PING: *
 # [constants] message SUBSCRIBE as SUBSCRIBE: *
 # [constants] message SUBSCRIBE_FIELDS as CHOSEN: *
+_SCHEMA_CRC = const(-67365510)
 _HELLO = const(1)
 _PING = const(2)
 _SUBSCRIBE = const(6)
@@ -85,13 +84,9 @@ class SessionHandlers(Handlers):
         self._hal = hal
         self._clock = clock
         self._tables = tables
-        self._name = (board.NAME.encode() + bytes(codec.TEXT_SIZE))[
-            : codec.TEXT_SIZE
+        self._name = (board.NAME.encode() + bytes(packing.TEXT_SIZE))[
+            : packing.TEXT_SIZE
         ]  # a letter of a string can allocate
-        crc = array("i", (0,))
-        for line in codec.schema_lines():
-            crc32_on(line, 0, len(line), crc)
-        self._schema_crc = crc[0]
         boot_id = hal.boot_id & 0xFFFFFFFF
         self._boot_id = boot_id - (boot_id >> 31 << 32)  # the same 32 bits as a signed word
 
@@ -124,10 +119,10 @@ class SessionHandlers(Handlers):
         board = self._board
         values[_HELLO_PROTOCOL_MIN] = PROTOCOL_MIN
         values[_HELLO_PROTOCOL_MAX] = PROTOCOL_MAX
-        values[_HELLO_SCHEMA_CRC] = self._schema_crc
+        values[_HELLO_SCHEMA_CRC] = _SCHEMA_CRC
         values[_HELLO_BOOT_ID] = self._boot_id
         values[_HELLO_FIRMWARE_MAJOR], values[_HELLO_FIRMWARE_MINOR], values[_HELLO_FIRMWARE_PATCH] = FIRMWARE
-        for index in range(codec.TEXT_SIZE):
+        for index in range(packing.TEXT_SIZE):
             values[_HELLO_BOARD + index] = self._name[index]
         values[_HELLO_BUBBLES] = board.BUBBLES
         values[_HELLO_TICK_US] = board.TICK_US

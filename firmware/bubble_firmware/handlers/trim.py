@@ -3,7 +3,7 @@
 from bubble_firmware.control import trim as trims
 from bubble_firmware.handlers.vented import is_vented
 from bubble_firmware.link.reply import Handlers
-from bubble_protocol import codec, frame
+from bubble_protocol import frame, packing
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class TrimHandlers(Handlers):
         self._bubbles = board.BUBBLES
         self._safety = safety
         self._trim = trim
-        message = codec.BY_ID[_CALIBRATION_WRITE]
+        message = packing.BY_ID[_CALIBRATION_WRITE]
         self._most = (frame.PAYLOAD_MAX - message.fixed_size) // message.stride  # trims for which a frame has room
 
     def requests(self) -> "dict[int, Callable[[int], None]]":

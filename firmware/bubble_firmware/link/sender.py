@@ -2,7 +2,7 @@
 
 from array import array
 
-from bubble_protocol import codec
+from bubble_protocol import packing
 from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import FRAME_MAX, PAYLOAD_MAX, Decoder, finish_frame, put_header
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
@@ -66,6 +66,6 @@ class Sender:
             self.unsent -= 1
 
     def _pack(self, frame: bytearray, message_id: int, number: int, count: int) -> int:
-        end = codec.BY_ID[message_id].pack(self.values, count, frame, _PAYLOAD_AT)
+        end = packing.BY_ID[message_id].pack(self.values, count, frame, _PAYLOAD_AT)
         put_header(frame, message_id, number)
         return finish_frame(frame, end - 1, crc32_into, self._window.key)

@@ -8,7 +8,7 @@ from bubble_firmware.link.receive_window import ReceiveWindow
 from bubble_firmware.link.reply import Reply
 from bubble_firmware.link.sender import Sender
 from bubble_firmware.link.telemetry import Telemetry
-from bubble_protocol import codec
+from bubble_protocol import packing
 from bubble_protocol.crc import crc32_into
 from bubble_protocol.frame import HEADER, PAYLOAD_MAX, Decoder
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
@@ -179,7 +179,7 @@ class Server:
         if handler is None:
             reply.refuse(_UNKNOWN_MESSAGE, 0, _NO_ELEMENT, message_id, 0, 0)
             return
-        message = codec.BY_ID[message_id]
+        message = packing.BY_ID[message_id]
         count = message.unpack(frame, _PAYLOAD_AT, size, reply.values)
         if count < 0:
             reply.refuse(_WRONG_LENGTH, 0, _NO_ELEMENT, size, message.size_min, PAYLOAD_MAX)
@@ -187,23 +187,20 @@ class Server:
             handler(count)
         reply.request = 0
 
-    def _within_limits(self, message: "codec.Message", count: int) -> bool:
+    def _within_limits(self, message: "packing.Packer", count: int) -> bool:
         """Whether all values are within the schema's limits; refuses where one is not."""
         values = self.reply.values
         at = message.first_out_of_range(values, count)
         if at < 0:
             return True
-        fixed = len(message.fixed)
+        fixed = message.fixed_values
         number = at
         element = _NO_ELEMENT
-        if at < fixed:
-            field = message.fixed[at]
-        else:
-            offset = (at - fixed) % message.stride_values
-            field = message.repeated[offset]
-            number = fixed + offset
+        if at >= fixed:
+            number = fixed + (at - fixed) % message.stride_values
             element = (at - fixed) // message.stride_values
-        low = field[3]
-        high = field[4]
+        lows, highs = message.limits or ((), ())
+        low = lows[number]
+        high = highs[number]
         self.reply.refuse_value(_OUT_OF_RANGE, number, element, at, low or 0, 65535 if high is None else high)
         return False

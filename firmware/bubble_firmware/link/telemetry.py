@@ -2,7 +2,7 @@
 
 from array import array
 
-from bubble_protocol import codec, frame
+from bubble_protocol import frame, packing
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Telemetry:
     """One subscription. `most`: how many fields a frame has room for. `dropped`: what has found no room since boot."""
 
     def __init__(self, board: "ModuleType", state: "BoardState", bubbles: "Bubbles", sender: "Sender"):
-        message = codec.BY_ID[_TELEMETRY_FIELDS]
+        message = packing.BY_ID[_TELEMETRY_FIELDS]
         self.most = (frame.PAYLOAD_MAX - message.fixed_size) // (message.stride * board.BUBBLES)
         self.dropped = 0
         self._clock = state.clock

@@ -19,7 +19,7 @@ _DEPTH = const(4)
 # [end of constants]
 
 _BLOCK = const(4096)  # bytes
-_SPARED = const(6)  # blocks of the heap that are not ours: what is made after us takes 11 kB
+_SPARED = const(9)  # blocks of the heap that are not ours: what is made after us takes 14 kB, and some is to stay free
 
 
 @micropython.viper
@@ -50,14 +50,16 @@ class SequenceMemory:
         # In blocks, because a heap that compiles its own code has no large ones left; no arrays, for each would be
         # made from a second one.
         self._per_block = _BLOCK // (2 * self.words)  # records
-        self._blocks: "list[bytearray]" = []
-        spared = [bytearray(_BLOCK) for _ in range(_SPARED)]
+        size = 2 * self._per_block * self.words
+        self._blocks = [bytearray(size)]
+        spared = []
         try:
-            for _ in range(board.SEQUENCE_BYTES // _BLOCK):
-                self._blocks.append(bytearray(2 * self._per_block * self.words))
+            for _ in range(_SPARED):
+                spared.append(bytearray(_BLOCK))
+            while len(self._blocks) < board.SEQUENCE_BYTES // _BLOCK:
+                self._blocks.append(bytearray(size))
         except MemoryError:  # a stock MicroPython has our code on its heap, too
-            if not self._blocks:
-                raise
+            pass
         del spared
         self.capacity = len(self._blocks) * self._per_block
         self.check = array("i", bytearray(4 * _CHECK))
