@@ -268,7 +268,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                     off = air
                     air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] >> 12
                     # What was learned of the curve at an air that was not there is wrong, too.
-                    off = (2 * row[_AIR_SD] - off + air | 2 * row[_AIR_SD] + off - air) >> 31
+                    off = (_AIR_SD_FAR - off + air | _AIR_SD_FAR + off - air) >> 31
                     row[_CURVE_ERROR] = row[_CURVE_ERROR] & ~off
                     row[_CURVE_ERROR_SD] = row[_CURVE_ERROR_SD] + (row[_CURVE_SD] - row[_CURVE_ERROR_SD] & off)
                     row[_AIR_SD] = _AIR_SD_EMPTY

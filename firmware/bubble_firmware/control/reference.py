@@ -256,8 +256,11 @@ def correct(row: ptr32, board: ptr32, bubble: int):
     else:
         gain = air_sd * u // (v >> 8)
         air = gain * r >> 8
-        if air > _AIR_SD_MAX:  # more in one step would be taken for air from a valve that is stuck
-            air = _AIR_SD_MAX
+        most = row[_AIR_SLOPE] * _FAR_UM >> 6  # the slope is one of so far: it says nothing of what lies beyond
+        if air > most:
+            air = most
+        if air < 0 - most:
+            air = 0 - most
         air += row[_AIR]
         row[_AIR] = air if air > 0 else 0
         gain = sd * w // (v >> 8)

@@ -202,7 +202,11 @@ class Bubble:
             self.empty_ticks += 1
         else:
             segment = 0
+            believed = self.air
             self.air = (pressure + ATMOSPHERE) * curve.volume[0] / 1000
+            if abs(believed - self.air) > 20000:
+                self.curve_error = 0.0
+                self.curve_error_sd = board.CURVE_SD / 65536
             self.air_sd = 200.0
             self.correlation = 0.0
         absolute = pressure + ATMOSPHERE
@@ -254,7 +258,8 @@ class Bubble:
             self.curve_error_sd = min(2 * sd, 0.4)
             self.dwell_slope = 0.0
             return
-        self.air = max(self.air + self.air_sd * u * r / v, 0.0)
+        most = 1500.0 * air_slope
+        self.air = max(self.air + min(max(self.air_sd * u * r / v, -most), most), 0.0)
         self.curve_error = min(max(error + sd * w * r / v, -0.4), 0.4)
         left_air = max(1 - u * u / v, 1 / 256) ** 0.5
         left_curve = max(1 - w * w / v, 1 / 256) ** 0.5

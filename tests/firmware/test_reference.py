@@ -1,0 +1,91 @@
+"""What the membrane may correct: never by more than its slope here can tell, and nothing that was learned at an air not there."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import bubble_firmware.control.state_layout as layout
+from bubble_firmware.control import reference
+from bubbleskin import boards
+from bubbleskin.sim.board import SimulatedBoard
+from bubbleskin.sim.firmware import InProcessFirmware
+
+APART_MM = 1.5
+"""By which one correction may move a bubble."""
+
+
+class Resting:
+    """A board whose bubbles are empty, and what its control keeps of each bubble, by name."""
+
+    def __init__(self):
+        self.firmware = InProcessFirmware(boards.load("wristband7"), 1)
+        self.board = SimulatedBoard("wristband7", contact=False, firmware=self.firmware)
+        self.bubbles = self.firmware.app.bubbles
+        n = self.bubbles.count
+        words = np.frombuffer(self.bubbles.state, np.int32)
+        self.rows = words[layout.ROWS :][: n * layout.ROW_WORDS].reshape(n, layout.ROW_WORDS)
+        self.run(0.3)
+
+    def __getitem__(self, name):
+        return self.rows[:, getattr(layout, name)]
+
+    def run(self, seconds):
+        for _ in range(round(seconds / self.board.tick_s)):
+            self.firmware.app.deadman.host_activity()
+            self.board.tick()
+
+
+@pytest.fixture(scope="module")
+def resting():
+    return Resting()
+
+
+@given(
+    st.integers(100, 60_000),  # µJ
+    st.integers(300, 26_000),
+    st.integers(-4000, 4000),
+    st.integers(-204_800, 204_800),
+    st.integers(1000, 40_000),  # Pa
+    st.integers(500, 40_000),
+    st.integers(25_000, 300_000),  # µJ
+)
+def test_a_correction_moves_no_bubble_further_than_its_slope_can_tell(
+    resting, air_sd, curve_sd, correlation, slope, pressure, here, air
+):
+    height_mm = 9.0
+    per_mm = (101.325 + pressure / 1000) * np.pi * height_mm**2 / 2  # µJ, of a sphere that grows
+    for name, value in {
+        "AIR": air,
+        "AIR_SD": air_sd,
+        "AIR_SLOPE": round(per_mm * 64 / 1000),
+        "CURVE_ERROR": 0,
+        "CURVE_ERROR_SD": curve_sd,
+        "CORRELATION": correlation,
+        "DWELL_SLOPE": slope or 1,
+        "CURVE_BEND": 0,
+        "CURVE_PRESSURE": here,
+        "QUIET_PRESSURE": pressure,
+    }.items():
+        resting[name][0] = value
+    reference.correct(resting.bubbles.rows, resting.bubbles.state, 1)
+    moved = abs(int(resting["AIR"][0]) - air)
+    assert moved <= (APART_MM + 0.05) * per_mm or resting["AIR"][0] == 0
+
+
+@pytest.mark.parametrize(("off", "kept"), [(0, True), (3000, True), (-60_000, False), (80_000, False)])
+def test_what_was_learned_at_an_air_that_was_not_there_is_forgotten(off, kept):
+    resting = Resting()
+    board_sd = int(resting["CURVE_SD"][0])
+    resting["AIR"][:] += off
+    resting["AIR_SD"][:] = 30_000
+    resting["CURVE_ERROR"][:] = -9000
+    resting["CURVE_ERROR_SD"][:] = 500
+    resting.run(0.5)
+    assert (resting["AIR_SD"] < 1000).all()
+    if kept:
+        assert (resting["CURVE_ERROR"] == -9000).all()
+        assert (resting["CURVE_ERROR_SD"] == 500).all()
+    else:
+        assert (resting["CURVE_ERROR"] == 0).all()
+        assert (resting["CURVE_ERROR_SD"] == board_sd).all()
