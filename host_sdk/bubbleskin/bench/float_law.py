@@ -258,8 +258,7 @@ class Bubble:
             self.curve_error_sd = min(2 * sd, 0.4)
             self.dwell_slope = 0.0
             return
-        most = 1500.0 * air_slope
-        self.air = max(self.air + min(max(self.air_sd * u * r / v, -most), most), 0.0)
+        self.air = max(self.air + min(max(self.air_sd * u * r / v, -1500 * air_slope), 1500 * air_slope), 0.0)
         self.curve_error = min(max(error + sd * w * r / v, -0.4), 0.4)
         left_air = max(1 - u * u / v, 1 / 256) ** 0.5
         left_curve = max(1 - w * w / v, 1 / 256) ** 0.5
