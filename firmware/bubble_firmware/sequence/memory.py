@@ -19,7 +19,7 @@ _DEPTH = const(4)
 # [end of constants]
 
 _BLOCK = const(4096)  # bytes
-_SPARED = const(9)  # blocks of the heap that are not ours: what is made after us takes 14 kB, and some is to stay free
+_SPARED = const(8)  # blocks of the heap that are not ours: what is made after us takes 10 kB, and some is to stay free
 
 
 @micropython.viper
