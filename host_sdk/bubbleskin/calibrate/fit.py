@@ -56,6 +56,8 @@ class Estimate:
     pressure_pa: Floats
     model_pa: Floats
     rms_pa: float
+    chi: float
+    """RMS of what the model is off, by what it usually is: 60 Pa, and what metered air is off where the curve is steep."""
     largest_mm: float
     """As high as it has been."""
     lift: float
@@ -155,6 +157,7 @@ def fit(data: Data, nominal: Nominal, flow: tuple[float, float] | None = None) -
         pressure_pa=measured,
         model_pa=expected,
         rms_pa=float(np.sqrt(np.mean((measured - expected) ** 2))),
+        chi=float(np.sqrt(np.mean(((measured - expected) / _deviations(values, data, _MODEL_PA[0])) ** 2))),
         largest_mm=float(heights(values, data).max()),
         lift=data.lift,
     )

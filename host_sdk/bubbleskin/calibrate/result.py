@@ -33,7 +33,7 @@ class BubbleCalibration:
     @property
     def chi(self) -> float:
         """How far its pressures are from a rubber's, by what is usual; NaN where nothing was fitted."""
-        return verdict.chi(self.estimate) if self.estimate else float("nan")
+        return self.estimate.chi if self.estimate else float("nan")
 
     @property
     def parameters(self) -> dict[str, tuple[float, float]]:

@@ -14,13 +14,11 @@ Floats = NDArray[np.float64]
 
 ACCEPTED, REDO, OUT_OF_FAMILY = "accepted", "redo", "out of family"
 
-GOOD_PA = 60.0
-"""What a model of rubber is usually off: χ is the residual's RMS by this and the noise of a mean."""
 CHI_MOST = 4.0
 LEAK_UNIT = 53.0
 """µJ/(s kPa) with which a bubble of 12 mm loses 1 % of its air in a second."""
-LEAK_MOST = 0.004
-"""Of its air a second, of a bubble at 12 mm: what silicone lets through is a twentieth of this."""
+LEAK_MOST = 0.005
+"""Of its air a second, of a bubble at 12 mm: what silicone lets through is a twentieth of that."""
 LEAK_SURE = 4.0
 LIFT_USUAL, LIFT_MOST = 7.0, 14.0
 LIFT_TIMES = 1.6
@@ -57,10 +55,14 @@ class Verdict:
 
 
 _BY_FAULT = {
-    "leak": ("leaking", "It lost its air faster than it could be measured: look at barb, tube and rubber."),
+    "leak": (
+        "leaking",
+        "It reported a leak on its way. Clear it and repeat; if it does so again, look at barb, tube and rubber.",
+    ),
     "overpressure": (
         "kinked tube",
-        "Its pressure went beyond the limit while it filled: its tube is kinked or blocked, or it is a much stiffer bubble.",
+        "Its pressure went beyond the limit while it filled: its tube is kinked or blocked, or it is much stiffer. Mend "
+        "it, clear the fault and repeat.",
     ),
 }
 _OTHER_RUBBER = Verdict(
@@ -94,7 +96,6 @@ def judge(
     odd: list[tuple[str, str]] = []
     if abs(zero_pa) > ZERO_MOST_PA:
         odd.append(("sensor zero", f"Its sensor says {zero_pa / 1e3:.2f} kPa without pressure: replace it."))
-    odd += [_BY_FAULT[fault] for fault in trace.faults.get(bubble, ()) if fault in _BY_FAULT]
     usual = float(np.median(list(lifts.values()))) if len(lifts) >= ENOUGH else LIFT_USUAL
     times = lifts[bubble] / usual
     if lifts[bubble] > LIFT_MOST and times > LIFT_TIMES:
@@ -117,31 +118,26 @@ def _rose(bubble: int, trace: Trace) -> bool:
     return float(np.percentile(trace.pressure_pa[:, trace.column(bubble)], 90)) > SOME_PA
 
 
-def chi(estimate: Estimate) -> float:
-    """The residual's RMS, by what is usual."""
-    return estimate.rms_pa / GOOD_PA
-
-
 def leak_share(estimate: Estimate) -> float:
     """Of its air, what a bubble at 12 mm loses in a second."""
     return 0.01 * float(estimate.values[LEAK]) / LEAK_UNIT
 
 
 def _not_measured(bubble: int, trace: Trace, estimate: Estimate | None) -> list[tuple[str, str]]:
-    found = []
-    if faults := trace.faults.get(bubble):
-        found.append(
-            ("faulted", f"It reported {', '.join(faults)} on its way: see `fault_log()`, clear it and repeat.")
-        )
+    faults = trace.faults.get(bubble, ())
+    found = [_BY_FAULT[fault] for fault in faults if fault in _BY_FAULT]
+    if faults and not found:
+        said = f"It reported {', '.join(faults)} on its way: see `fault_log()`, clear it and repeat."
+        found.append(("faulted", said))
     if trace.lost:
         found.append(("lost telemetry", f"{trace.lost} readings have not come: look at the link's cable and repeat."))
-    if estimate is None:
+    if estimate is None and not faults:
         found.append(("too little data", "Its line was quiet too seldom to measure: look whether it rises at all."))
-    elif estimate.largest_mm < HEIGHT_LEAST_MM:
+    elif estimate and estimate.largest_mm < HEIGHT_LEAST_MM:
         found.append(
             ("too little data", f"It rose to {estimate.largest_mm:.1f} mm only: see the supply in `health()`.")
         )
-    elif chi(estimate) > CHI_MOST:
+    elif estimate and estimate.chi > CHI_MOST:
         found.append(
             ("bad fit", f"Its pressures are {estimate.rms_pa:.0f} Pa off every rubber: leave it alone and repeat.")
         )
