@@ -31,9 +31,11 @@ def test_figures_are_the_plants(done):
             assert abs(values[at] - true) < 3.0 * sd[at] + 0.04
         line, line_sd = each.parameters["line_mm3"]
         assert abs(line - 1e9 * (plant.node_volume + plant.tube_volume)[each.bubble]) < 3.0 * line_sd
+        leak, leak_sd = each.parameters["leak"]
+        assert abs(leak - 1e9 * plant.leak[each.bubble]) < 3.0 * leak_sd
         low, high = each.interval("leak")
-        assert low < 1.0
-        assert high > 0.0
+        assert (low + high) / 2 == pytest.approx(leak)
+        assert high - low == pytest.approx(2 * 1.96 * leak_sd)
     assert set(done.calibration[0].parameters) == set(NAMES)
 
 
@@ -57,7 +59,9 @@ def test_progress_rises_to_the_end(done):
     shares = [each.done for each in done.progress]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
-    assert sorted(bubble for each in done.progress[1:-1] for bubble in each.bubbles) == list(range(7))
+    assert {each.what for each in done.progress} == {"zeros, at rest", "stretching and stepping", "fitting"}
+    assert {bubble for each in done.progress[:-1] for bubble in each.bubbles} == set(range(7))
+    assert np.diff(shares).max() < 0.1
 
 
 def test_a_line_for_each(done):

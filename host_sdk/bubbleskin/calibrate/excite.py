@@ -20,15 +20,15 @@ BEFORE_S = 0.15
 STRETCH_MM = (8.0, 10.5, 12.0, 12.6)
 STRETCH_S = 0.15
 TOP_MM, TOP_S = 13.1, 0.35
-# Not lower than 7 mm, and from rest to no more than 5.3: with valves 10 % off and stiff rubber, gas that cools and rubber that
-# relaxes look there like a leak or a stuck valve to firmware that nobody has calibrated.
+# Below 6 mm gas that cools and rubber that relaxes look like a leak or a stuck valve to firmware that nobody has calibrated: not
+# lower than 7 mm, where a vent valve may be 10 % off and the air by more, and from rest past that at once.
 DOWN_MM = (11.6, 10.2, 8.9, 7.8, 7.0)
 DOWN_S = 0.25
 EMPTY_S = 0.45
-"""Between both ways: its air is known anew, and the steep beginning of the curve is filled from rest, where little can be off."""
-LOW_MM, LOW_S = 6.0, 0.8
-"""The step that is held longer: where pressure is steep, a leak shows most."""
-UP_MM = (5.3, LOW_MM, 6.5, 7.1, 7.8, 8.6, 9.5, 10.5, 11.5, 12.3, 13.0)
+"""Between both ways: its air is known anew."""
+LOW_MM, LOW_S = 6.2, 1.0
+"""The step that is held longer: where pressure is steep, a leak shows."""
+UP_MM = (LOW_MM, 6.7, 7.3, 8.0, 8.8, 9.7, 10.6, 11.5, 12.3, 13.0)
 UP_S = 0.20
 SLOWER = 1.8
 """By what all this takes longer where a tick is longer than `QUICK_TICK_S`: two readings make one of theirs."""

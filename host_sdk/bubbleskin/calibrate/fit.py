@@ -40,7 +40,7 @@ _LEAK_SD = 50.0
 _NOISE_PA = 60.0  # of one reading
 _MODEL_PA = 60.0, 15.0, 400.0  # what the model is off at first; at least and at most
 _AIR_UJ, _AIR_SHARE = 100.0, 0.0003  # what metered air is off
-_CORRELATED = 1.5  # neighbouring means are off alike
+_CORRELATED = 2.0  # neighbouring means are off alike
 MEANS_LEAST = 20
 
 
@@ -121,8 +121,11 @@ def beforehand(nominal: Nominal) -> tuple[Floats, Floats]:
 _NOT_BELOW_ZERO = (MU, C2, C3, SOFTENING, QUICK, SLOW)
 
 
-def fit(data: Data, nominal: Nominal, flow: tuple[float, float] | None = None) -> Estimate:
-    """Fit all unknowns. `flow`: what others tell of the fill valve's flow factor, and its standard deviation.
+def fit(
+    data: Data, nominal: Nominal, flow: tuple[float, float] | None = None, start: Estimate | None = None
+) -> Estimate:
+    """Fit all unknowns. `flow`: what others tell of the fill valve's flow factor, and its standard deviation. `start`: a fit
+    without that.
 
     There must be `MEANS_LEAST` means.
     """
@@ -134,20 +137,19 @@ def fit(data: Data, nominal: Nominal, flow: tuple[float, float] | None = None) -
         prior[FILL], prior_sd[FILL] = _together((prior[FILL], prior_sd[FILL]), flow)
     low = np.full(len(prior), -np.inf)
     low[list(_NOT_BELOW_ZERO)] = 0.0
-    values = prior.copy()
-    off = _MODEL_PA[0]
-    for _ in range(3):
+    values = start.values.copy() if start else prior.copy()
+    off = _off(start.pressure_pa - start.model_pa) if start else _MODEL_PA[0]
+    for _ in range(1 if start else 3):
         sd = _deviations(values, data, off)
 
         def residuals(now: Floats, sd: Floats = sd) -> Floats:
             return np.concatenate([_robust((measured - model(now, data)[0]) / sd), (now - prior) / prior_sd])
 
-        start = np.maximum(values, low + 1e-6 * prior_sd)
-        solved = least_squares(residuals, start, bounds=(low, np.inf), x_scale=prior_sd, xtol=1e-6, ftol=1e-6)
+        first = np.maximum(values, low + 1e-6 * prior_sd)
+        solved = least_squares(residuals, first, bounds=(low, np.inf), x_scale=prior_sd, xtol=1e-6, ftol=1e-6)
         values = solved.x
         expected, height = model(values, data)
-        spread = 1.48 * float(np.median(np.abs(measured - expected)))
-        off = float(np.clip(_CORRELATED * spread, *_MODEL_PA[1:]))
+        off = _off(measured - expected)
     slopes = np.asarray(solved.jac)
     covariance = np.linalg.pinv(slopes.T @ slopes)
     return Estimate(
@@ -161,6 +163,11 @@ def fit(data: Data, nominal: Nominal, flow: tuple[float, float] | None = None) -
         largest_mm=float(heights(values, data).max()),
         lift=data.lift,
     )
+
+
+def _off(left: Floats) -> float:
+    """What the model is off by, Pa, from what it leaves: half of all is less than 0.67 standard deviations."""
+    return float(np.clip(_CORRELATED * 1.48 * float(np.median(np.abs(left))), *_MODEL_PA[1:]))
 
 
 def _together(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:

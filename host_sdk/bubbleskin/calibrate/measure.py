@@ -19,6 +19,7 @@ from bubbleskin.layout import Layout
 Floats = NDArray[np.float64]
 
 _MOVED_MM = 0.01
+_TOLD_EVERY = 50  # readings
 _RECENT = 5  # readings whose mean is compared with the pressure that stops a bubble
 
 
@@ -41,6 +42,9 @@ class Wristband(Protocol):
 
     async def vent(self) -> None:
         """Open all vents."""
+
+    async def state(self) -> State:
+        """The state now."""
 
     async def sleep(self, seconds: float) -> None:
         """Wait on the device's clock."""
@@ -76,38 +80,39 @@ async def measure(skin: Wristband, bubbles: Sequence[int], progress: Progress | 
     tick = skin.info.tick
     groups = excite.groups(skin.layout, bubbles)
     whole = excite.device_seconds(len(groups), tick)
-    passed = 0.0
+    first = 0.0
 
-    def tell(what: str, which: Sequence[int]) -> None:
-        if progress:
-            progress(CalibrationProgress(what, tuple(which), min(passed / whole, 1.0)))
+    def tell(what: str, which: Sequence[int]) -> Callable[[float], None]:
+        def at(now: float) -> None:
+            if progress:
+                progress(CalibrationProgress(what, tuple(which), min((now - first) / whole, 1.0)))
+
+        return at
 
     try:
         await skin.vent()
-        tell("zeros, at rest", ())
-        rest = await _run(skin, [], [Step(0.0, excite.REST_S, True)])
-        first = rest[0].time
+        first = (await skin.state()).time
+        rest = await _run(skin, [], [Step(0.0, excite.REST_S, True)], tell("zeros, at rest", ()))
         zero = 1e3 * np.mean([state.pressure_kpa for state in rest], axis=0)
         last = rest[-1].time
         traces: list[Trace] = []
         for group in groups:
-            passed = last - first
-            tell("stretching and stepping", group)
             plan = list(excite.steps(tick))
-            states = await _run(skin, group, plan)
+            states = await _run(skin, group, plan, tell("stretching and stepping", group))
             last = states[-1].time
             stretching = sum(step.seconds for step in plan if step.stretching) + excite.phase(len(group), tick)
             traces.append(of_states(states, group, tick, stretching))
             await skin.vent()
             await skin.sleep(excite.GAP_S)
-        passed = whole
         return Measured(tuple(traces), zero, last + excite.GAP_S - first)
     finally:
         with contextlib.suppress(LinkError):  # without a host it vents by itself
             await skin.vent()
 
 
-async def _run(skin: Wristband, group: Sequence[int], plan: Sequence[Step]) -> list[State]:
+async def _run(
+    skin: Wristband, group: Sequence[int], plan: Sequence[Step], tell: Callable[[float], None]
+) -> list[State]:
     """One group through its steps, each bubble a little after the one before: their fillings are told apart by that."""
     info = skin.info
     ends = np.cumsum([step.seconds for step in plan])
@@ -119,6 +124,8 @@ async def _run(skin: Wristband, group: Sequence[int], plan: Sequence[Step]) -> l
     telemetry = skin.telemetry(1.0 / info.tick, FIELDS)
     try:
         async for state in telemetry:
+            if len(states) % _TOLD_EVERY == 0:
+                tell(state.time)
             states.append(state)
             since = state.time - states[0].time + 1e-6
             if since > ends[-1] + lag * len(group):

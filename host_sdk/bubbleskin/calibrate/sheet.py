@@ -34,15 +34,17 @@ def estimate(
     flows = _told_by_others(traces, data, alone)
     if not flows:
         return alone, data
-    again = {bubble: _fitted(data[bubble], nominal, flows[bubble]) for bubble in alone}
+    again = {bubble: _fitted(data[bubble], nominal, flows[bubble], one) for bubble, one in alone.items()}
     return {bubble: one for bubble, one in again.items() if one}, data
 
 
-def _fitted(data: Data, nominal: Nominal, flow: tuple[float, float] | None) -> Estimate | None:
+def _fitted(
+    data: Data, nominal: Nominal, flow: tuple[float, float] | None, start: Estimate | None = None
+) -> Estimate | None:
     """A fit; None where data is of no bubble at all, and numbers run out of bounds."""
     try:
         with np.errstate(all="ignore"):
-            found = fits.fit(data, nominal, flow)
+            found = fits.fit(data, nominal, flow, start)
     except (ValueError, np.linalg.LinAlgError):
         return None
     return found if np.isfinite(found.values).all() and np.isfinite(found.covariance).all() else None
