@@ -143,3 +143,27 @@ def test_a_calibration_of_another_board_is_refused(done):
         pytest.raises(bs.InvalidInput, match="is of a wristband7 with 7 bubbles"),
     ):
         skin.upload_calibration(done.calibration)
+
+
+@pytest.mark.slow
+def test_measured_heights_tell_sizes(sheets):
+    with sheets.skin_of(sheets.real(seed=6)) as skin:
+        found = skin.calibrate(save=False)
+        skin.show(np.full(7, 11.0), wait=False)
+        skin.sleep(3.0)
+        told, true = skin.state().height_mm, skin.simulated.alone_mm
+        skin.vent()
+        skin.sleep(2.0)
+        better = found.refined({bubble: [(told[bubble], true[bubble])] for bubble in range(7)}, sd_mm=0.02)
+        skin.upload_calibration(better)
+        assert sheets.rms(sheets.errors_mm(skin)) < 0.05
+        assert better[3].parameters["fill_flow"][1] < found[3].parameters["fill_flow"][1]
+
+
+@pytest.mark.parametrize(
+    ("heights", "said"),
+    [({9: [(8.0, 8.0)]}, "was not calibrated"), ({2: [8.0]}, "pairs"), ({2: [(8.0, 80.0)]}, "times as high")],
+)
+def test_heights_that_are_none(done, heights, said):
+    with pytest.raises(bs.InvalidInput, match=said):
+        done.calibration.refined(heights)

@@ -28,7 +28,9 @@ def small(done, tmp_path_factory):
     cut = {name: getattr(first, name)[:30] for name in ("pressure_pa", "fill_us", "vent_us", "supply_pa")}
     trace = type(first)(**vars(first) | cut)
     measured = Measured((trace,), c.measured.zero_pa, c.measured.device_s)
-    return json.loads(archive.text(c.board, c.nominal, c.atmosphere_kpa, c.zero_counts, measured, []))
+    return json.loads(
+        archive.text(c.board, c.nominal, c.atmosphere_kpa, c.zero_counts, measured, {2: (1.01, 0.004)}, [])
+    )
 
 
 def test_raw_data_comes_back(done, path):
@@ -67,6 +69,8 @@ def test_people_can_read_what_was_found(path):
         ("zero_pa", [0.0], "shape"),
         ("nominal", {}, "nominal"),
         ("traces", [3], "a trace"),
+        ("sizes", {"2": [1.0]}, "sizes"),
+        ("sizes", {"9": [1.0, 0.01]}, "names the bubble"),
         ("device_s", "long", "device_s"),
     ],
 )

@@ -4,6 +4,7 @@ Only the raw data is read again. What it claims to be is held against what a wri
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -35,10 +36,17 @@ class Read(NamedTuple):
     atmosphere_kpa: float
     zero_counts: tuple[int, ...]
     measured: Measured
+    sizes: dict[int, tuple[float, float]]
 
 
 def text(
-    board: str, nominal: Nominal, atmosphere_kpa: float, zero_counts: tuple[int, ...], measured: Measured, found: Any
+    board: str,
+    nominal: Nominal,
+    atmosphere_kpa: float,
+    zero_counts: tuple[int, ...],
+    measured: Measured,
+    sizes: Mapping[int, tuple[float, float]],
+    found: Any,
 ) -> str:
     """The file's text; `found` is for people."""
     head = {
@@ -49,6 +57,7 @@ def text(
         "zero_pa": [round(float(zero), 3) for zero in measured.zero_pa],
         "device_s": measured.device_s,
         "nominal": nominal._asdict(),
+        "sizes": {str(bubble): list(size) for bubble, size in sizes.items()},
         "found": found,
     }
     lines = [f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
@@ -101,7 +110,13 @@ def _read(tree: dict[str, Any]) -> Read:
             _numbers("zero_pa", tree["zero_pa"], (count,), -_PA_MOST, _PA_MOST),
             checks.number("device_s", tree["device_s"], 0.0, 1e6, "s"),
         ),
+        sizes={key: _size(value) for key, value in _by_bubble("sizes", tree["sizes"], count)},
     )
+
+
+def _size(value: Any) -> tuple[float, float]:
+    factor, sd = _numbers("sizes", value, (2,), 0.0, 2.0)
+    return checks.number("sizes", float(factor), 0.5, 2.0), checks.number("sizes", float(sd), 1e-6, 2.0)
 
 
 def _nominal(tree: Any) -> Nominal:

@@ -1,6 +1,6 @@
 """A calibration: what was measured, what was found of each bubble, whether it is used, and how it goes into a file."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -8,15 +8,20 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin import files
+from bubbleskin import checks, files
 from bubbleskin.calibrate import archive, device, verdict
 from bubbleskin.calibrate.fit import NAMES, UNITS, Estimate
 from bubbleskin.calibrate.measure import Measured
 from bubbleskin.calibrate.nominal import Nominal
+from bubbleskin.calibrate.sheet import Sizes, sized
 from bubbleskin.calibrate.sheet import estimate as estimate_sheet
 from bubbleskin.calibrate.verdict import Verdict
+from bubbleskin.errors import InvalidInput
 
 Floats = NDArray[np.float64]
+
+_SIZE_MOST = 1.15
+"""Of measured heights to those told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +70,23 @@ class SelfCalibration:
     """Of each sensor, as the wristband had them while it measured; (n,)."""
     measured: Measured
     bubbles: tuple[BubbleCalibration, ...]
+    sizes: Mapping[int, tuple[float, float]]
+    """What measured heights have told, see `refined`: by bubble a factor of heights and its standard deviation."""
 
     @classmethod
     def of(
-        cls, board: str, nominal: Nominal, measured: Measured, atmosphere_kpa: float, zero_counts: tuple[int, ...]
+        cls,
+        board: str,
+        nominal: Nominal,
+        measured: Measured,
+        atmosphere_kpa: float,
+        zero_counts: tuple[int, ...],
+        sizes: Sizes | None = None,
     ) -> Self:
         """Fit everything."""
         atmosphere = 1e3 * atmosphere_kpa
         estimates, data = estimate_sheet(measured.traces, measured.zero_pa, atmosphere, nominal)
+        estimates = sized(estimates, data, nominal, sizes or {})
         lifts = {bubble: one.lift for bubble, one in data.items()}
         found = []
         faulted = sum(len(trace.faults) for trace in measured.traces)
@@ -89,7 +103,7 @@ class SelfCalibration:
                 )
                 found.append(BubbleCalibration(bubble, said, one, used))
         found.sort(key=lambda each: each.bubble)
-        return cls(board, nominal, atmosphere_kpa, zero_counts, measured, tuple(found))
+        return cls(board, nominal, atmosphere_kpa, zero_counts, measured, tuple(found), dict(sizes or {}))
 
     def __repr__(self) -> str:
         return f"<SelfCalibration of a {self.board}: {len(self.accepted)} of {len(self.bubbles)} bubbles accepted>"
@@ -109,6 +123,36 @@ class SelfCalibration:
     def device_s(self) -> float:
         """How long the wristband was at it."""
         return self.measured.device_s
+
+    def refined(self, heights_mm: Mapping[int, Sequence[tuple[float, float]]], sd_mm: float = 0.05) -> Self:
+        """With what measured heights tell of sizes, which no sensor of the board does: the same, fitted again.
+
+        `heights_mm`: by bubble, pairs of the height that the wristband told (`state().height_mm`) while it used this
+        calibration and of the height that was measured, by camera or calliper; heights from 8 mm on tell most. `sd_mm`: of one
+        measured height.
+        """
+        sd = checks.above_zero("sd_mm", sd_mm, 1.0, "mm")
+        known = {each.bubble for each in self.bubbles}
+        sizes = dict(self.sizes)
+        for bubble, pairs in heights_mm.items():
+            if bubble not in known:
+                raise InvalidInput(f"Bubble {bubble} was not calibrated; {', '.join(map(str, sorted(known)))} were.")
+            told = checks.finite("heights_mm", list(pairs))
+            if told.ndim != 2 or told.shape[1] != 2 or told.size == 0 or told.min() <= 0:
+                raise InvalidInput(
+                    f"heights_mm of bubble {bubble} must be pairs of a height told and one measured, in mm."
+                )
+            weights = told[:, 0] ** 2
+            factor = float(np.average(told[:, 1] / told[:, 0], weights=weights))
+            if not 1.0 / _SIZE_MOST < factor < _SIZE_MOST:
+                raise InvalidInput(
+                    f"Bubble {bubble} was measured {factor:.2f} times as high as it told; at most {_SIZE_MOST:g} is a size. "
+                    "Look whether heights are those of this bubble, in mm above the base plane."
+                )
+            before = sizes.get(bubble, (1.0, 0.0))[0]
+            sizes[bubble] = before * factor, float(sd / np.sqrt(weights.sum()))
+        facts = self.board, self.nominal, self.measured, self.atmosphere_kpa, self.zero_counts
+        return type(self).of(*facts, sizes)
 
     def report(self) -> str:
         """A line for each bubble, and what to do where there is something."""
@@ -142,14 +186,14 @@ class SelfCalibration:
 
     def save(self, path: str | Path) -> None:
         """Write the raw data, and what was found for people to read, to the file `path`."""
-        facts = self.board, self.nominal, self.atmosphere_kpa, self.zero_counts, self.measured
+        facts = self.board, self.nominal, self.atmosphere_kpa, self.zero_counts, self.measured, self.sizes
         files.write_text(path, archive.text(*facts, self.as_dict()["bubbles"]), "the calibration")
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read what `save` wrote, and fit it; `InvalidInput` says what is wrong with a file."""
         read = archive.read(path)
-        return cls.of(read.board, read.nominal, read.measured, read.atmosphere_kpa, read.zero_counts)
+        return cls.of(read.board, read.nominal, read.measured, read.atmosphere_kpa, read.zero_counts, read.sizes)
 
 
 def _found(each: BubbleCalibration) -> str:

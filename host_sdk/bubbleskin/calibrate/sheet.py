@@ -1,6 +1,7 @@
 """All bubbles together: each fitted by itself, then again with what the others tell of its restrictor."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from bubbleskin.calibrate import fit as fits
 from bubbleskin.calibrate import yardstick
 from bubbleskin.calibrate.data import Data, of_trace
-from bubbleskin.calibrate.fit import FILL, FILL_LATE, MEANS_LEAST, Estimate
+from bubbleskin.calibrate.fit import FILL, FILL_LATE, LINE, MEANS_LEAST, VENT, Estimate
 from bubbleskin.calibrate.nominal import Nominal
 from bubbleskin.calibrate.trace import Trace
 
@@ -16,8 +17,30 @@ Floats = NDArray[np.float64]
 
 _COMPARED_LEAST = 3
 """Bubbles: with fewer there is hardly anything to compare with."""
+_VOLUMES = FILL, VENT, LINE
 _COMPARED_SD = 0.01
 """Share by which a comparison is off besides its noise: pressures at which restrictors work, heat."""
+
+
+Sizes = Mapping[int, tuple[float, float]]
+"""By bubble: how many times as high it is as was found, and the standard deviation of that."""
+
+
+def sized(
+    estimates: Mapping[int, Estimate], data: Mapping[int, Data], nominal: Nominal, sizes: Sizes
+) -> dict[int, Estimate]:
+    """Estimates of bubbles whose heights have been measured: with lengths times s, all volumes and flows are times s³."""
+    found = dict(estimates)
+    for bubble, (factor, sd) in sizes.items():
+        if bubble not in estimates:
+            continue
+        one = estimates[bubble]
+        flow = float(one.values[FILL]) * factor**3
+        start = replace(
+            one, values=one.values * np.where(np.isin(np.arange(len(one.values)), _VOLUMES), factor**3, 1.0)
+        )
+        found[bubble] = _fitted(data[bubble], nominal, (flow, 3.0 * sd * flow), start) or one
+    return found
 
 
 def estimate(
