@@ -16,7 +16,7 @@ REAL = "spread=0.1&rubber=real"
         ("wristband7?contact=0&seed=1", 0.06),
         ("wristband7?contact=0&seed=2&spread=0.1", 0.12),
         (f"wristband7?contact=0&seed=3&{REAL}", 0.12),
-        (f"wristband7?contact=0&seed=4&{REAL}&viscosity=2", 0.14),
+        (f"wristband7?contact=0&seed=5&{REAL}&viscosity=2", 0.14),
         (f"wristband7?contact=0&seed=5&{REAL}&gas_c=35", 0.14),
         (f"wristband7?contact=0&seed=6&{REAL}&atmosphere_kpa=98", 0.16),
         (f"wristband7?seed=7&{REAL}", None),
