@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import bubbleskin as bs
@@ -68,11 +69,41 @@ def test_one_that_is_not_accepted_is_status_1(run, of_one, tmp_path):
     assert "faulted: It reported valve_stuck" in out
 
 
+def test_heights_refine_a_file_and_go_up(run, of_one, tmp_path):
+    heights, better = tmp_path / "heights.csv", tmp_path / "better.json"
+    heights.write_text("bubble,told [mm],measured [mm]\n0,11.0,11.22\n", encoding="utf-8")
+    code, _, _ = run("--load", of_one, "--heights", heights, "--upload", "--device", "sim://wristband7", "-o", better)
+    assert code == 0
+    one, other = (bs.SelfCalibration.load(path)[0].estimate.curve(np.array([11.0])) for path in (of_one, better))
+    assert other < one  # it is larger than was thought, so this pressure is that of a greater height
+    assert json.loads(better.read_text(encoding="utf-8"))["sizes"]["0"][0] == pytest.approx(1.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("bubble,told,measured\n0,11,11\n", "first row must be"),
+        ("bubble,told [mm],measured [mm]\n", "no heights"),
+        ("bubble,told [mm],measured [mm]\n0,11\n", "line 2"),
+        ("bubble,told [mm],measured [mm]\n0.5,11,11\n", "count from 0"),
+        ("bubble,told [mm],measured [mm]\n0,high,11\n", "not a number"),
+        ("bubble,told [mm],measured [mm]\n3,11,11\n", "Bubble 3 was not calibrated"),
+    ],
+)
+def test_a_table_that_is_none(run, of_one, tmp_path, text, said):
+    heights = tmp_path / "heights.csv"
+    heights.write_text(text, encoding="utf-8")
+    code, out, err = run("--load", of_one, "--heights", heights)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["--load", "nowhere.json"], "Cannot read the calibration"),
         (["--load", "x.json", "--bubbles", "2"], "leave --bubbles out"),
+        (["--upload"], "go with --load"),
         (["--bubbles", "7", "--device", "sim://wristband7"], "bubbles is 7"),
         (["--board", "nowhere.py", "--device", "sim://wristband7"], "nowhere.py"),
     ],

@@ -24,6 +24,8 @@ class Chosen(NamedTuple):
     bubbles: tuple[int, ...]
     board: str | None
     load: Path | None
+    heights: Path | None
+    upload: bool
     save: bool
 
 
@@ -40,7 +42,13 @@ class Written(NamedTuple):
 @click.option("-o", "--output", type=_FILE, help="Write raw data and what was found to a JSON file.")
 @click.option("--picture", type=_FILE, help="Draw curves, fits and bands: png, svg or pdf.")
 @click.option("--board", metavar="FILE", help="The board's file, where it is one of your own.")
-@click.option("--load", type=_FILE, help="Fit the raw data of such a file again; nothing is measured or uploaded.")
+@click.option("--load", type=_FILE, help="Fit the raw data of such a file again instead of measuring.")
+@click.option(
+    "--heights",
+    type=_FILE,
+    help="With --load: measured heights, a CSV file: bubble, told [mm], measured [mm].",
+)
+@click.option("--upload", is_flag=True, help="With --load: let the wristband use it.")
 @device
 @as_json
 @gathered(chosen=Chosen, written=Written)
@@ -54,7 +62,16 @@ def calibrate(chosen: Chosen, written: Written, device: str | None, json: bool) 
 
     if chosen.load and chosen.bubbles:
         raise InvalidInput("--load fits all bubbles of its file; leave --bubbles out.")
+    if not chosen.load and (chosen.heights or chosen.upload):
+        raise InvalidInput("--heights and --upload go with --load: heights are told by a calibration that is in use.")
     found = SelfCalibration.load(chosen.load) if chosen.load else _measured(chosen, device)
+    if chosen.heights:
+        from bubbleskin.calibrate.heights import read_heights
+
+        found = found.refined(read_heights(chosen.heights))
+    if chosen.upload:
+        with connect(device) as skin:
+            skin.upload_calibration(found, chosen.save)
     if written.output:
         found.save(written.output)
     click.echo(jsonlib.dumps(found.as_dict(), indent=2) if json else found.report())
