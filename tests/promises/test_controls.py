@@ -9,7 +9,7 @@ from hypothesis import Phase
 from bubble_firmware.control import state_layout as layout
 from bubble_firmware.safety.state import HOST_QUIET, NO_EVENT
 from bubble_firmware.safety.watch_layout import OVERFILLED_BUBBLE
-from bubble_protocol.schema.faults import LEAK, NO_AIR
+from bubble_protocol.schema.faults import ESTOP, LEAK, NO_AIR
 
 ANY = 255
 
@@ -124,7 +124,14 @@ def holds_for_ever(app):
 
 
 def no_emergency_stop(app):
-    app.commands.fault = lambda board_faults: None
+    """It is no fault of the board; the others are."""
+    fault = app.commands.fault
+
+    def others(board_faults):
+        if board_faults & ~ESTOP or app.supply.lost:
+            fault(board_faults & ~ESTOP)
+
+    app.commands.fault = others
 
 
 def does_not_dump(app):
