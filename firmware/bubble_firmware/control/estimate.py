@@ -265,12 +265,14 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 else:
                     segment = row[_FIRST_SEGMENT]
                     knot = ptr32(uint(curves) + segment)
-                    off = air
+                    believed = air
                     air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] >> 12
                     # What was learned of the curve at an air that was not there is wrong, too.
-                    off = (_AIR_SD_FAR - off + air | _AIR_SD_FAR + off - air) >> 31
-                    row[_CURVE_ERROR] = row[_CURVE_ERROR] & ~off
-                    row[_CURVE_ERROR_SD] = row[_CURVE_ERROR_SD] + (row[_CURVE_SD] - row[_CURVE_ERROR_SD] & off)
+                    wrong = (
+                        _AIR_SD_FAR - believed + air | _AIR_SD_FAR + believed - air
+                    ) >> 31  # -1 where it was, else 0
+                    row[_CURVE_ERROR] = row[_CURVE_ERROR] & ~wrong
+                    row[_CURVE_ERROR_SD] = row[_CURVE_ERROR_SD] + (row[_CURVE_SD] - row[_CURVE_ERROR_SD] & wrong)
                     row[_AIR_SD] = _AIR_SD_EMPTY
                     row[_REZERO] = 0
                     row[_LEAKED] = 0
