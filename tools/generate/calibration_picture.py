@@ -6,7 +6,6 @@ python tools/generate/calibration_picture.py --check    # fail if the figures ar
 The picture is not compared: fonts differ from machine to machine. The figures are, to a hundredth.
 """
 
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -36,7 +35,4 @@ def numbers() -> str:
 
 
 if __name__ == "__main__":
-    if "--check" not in sys.argv:
-        save(draw(calibration()), generated.ROOT / PICTURE)
-        print(f"drew {PICTURE}")
-    generated.main({NUMBERS: numbers})
+    generated.main({NUMBERS: numbers}, {PICTURE: lambda path: save(draw(calibration()), path)})

@@ -4,7 +4,6 @@ python tools/generate/contact_pictures.py            # draw them, write the tabl
 python tools/generate/contact_pictures.py --check    # fail if the model's heights are not those of the table
 """
 
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -29,18 +28,22 @@ def numbers() -> str:
     return "\n".join(rows) + "\n"
 
 
-def draw() -> None:
-    membrane.save(contact.plot_order(shapes()), generated.ROOT / PICTURES / "contact_order.png")
+def draw_order(path: Path) -> None:
+    membrane.save(contact.plot_order(shapes()), path)
+
+
+def draw_plan(path: Path) -> None:
     model = bs.CompliantContact(bs.Layout.hexagon(rings=1))
-    found = bs.plan(PLANNED, model.layout, contact=model)
-    membrane.save(contact.plot_plan(found, model), generated.ROOT / PICTURES / "contact_plan.png")
+    membrane.save(contact.plot_plan(bs.plan(PLANNED, model.layout, contact=model), model), path)
+
+
+def draw_pulse(path: Path) -> None:
     with bs.connect("sim://wristband7") as skin:
         frames = watch(skin, bs.sequences.pulse(skin.layout, loops=1), rate=10)
-        animate(skin.layout, frames, generated.ROOT / PICTURES / "pulse.gif", title="pulse")
-    print("drew contact_order.png, contact_plan.png and pulse.gif")
+        animate(skin.layout, frames, path, title="pulse")
 
 
 if __name__ == "__main__":
-    if "--check" not in sys.argv:
-        draw()
-    generated.main({PICTURES / "contact_order.csv": numbers})
+    drawn = {"contact_order.png": draw_order, "contact_plan.png": draw_plan, "pulse.gif": draw_pulse}
+    pictures = {PICTURES / name: draw for name, draw in drawn.items()}
+    generated.main({PICTURES / "contact_order.csv": numbers}, pictures)

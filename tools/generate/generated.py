@@ -8,10 +8,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def main(files: dict[Path, Callable[[], str]]) -> None:
+def main(files: dict[Path, Callable[[], str]], pictures: dict[Path, Callable[[Path], None]] | None = None) -> None:
+    """Write `files`, and draw `pictures`, by what writes each to a path; pictures differ by library, so they are not compared."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is out of date")
     check = parser.parse_args().check
+    for name, draw in ({} if check else pictures or {}).items():
+        draw(ROOT / name)
+        print(f"drew {name}")
     stale = []
     for name, make in files.items():
         path, text = ROOT / name, make()

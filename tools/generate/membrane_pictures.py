@@ -7,7 +7,6 @@ Pictures are not compared: fonts differ from machine to machine. The numbers are
 of a picture shows, to five digits.
 """
 
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -58,10 +57,6 @@ def measurements(made: Measurements, what: str) -> str:
 
 
 if __name__ == "__main__":
-    if "--check" not in sys.argv:
-        for name, figure in figures().items():
-            membrane.save(figure, generated.ROOT / PICTURES / f"{name}.png")
-            print(f"drew {PICTURES / name}.png")
     files = {PICTURES / f"{name}.csv": (lambda name=name: numbers(name)) for name in figures()}
     files[DATA / "single_bubble.csv"] = lambda: measurements(
         membrane.figure_4()[1], "one bubble at 15 heights, three times each, as in the paper's Fig. 4"
@@ -69,4 +64,8 @@ if __name__ == "__main__":
     files[DATA / "sheet.csv"] = lambda: measurements(
         membrane.figure_6()[1], "seven bubbles of one sheet at rising pressures, three times each, as in Fig. 6"
     )
-    generated.main(files)
+    pictures = {
+        PICTURES / f"{name}.png": (lambda path, figure=figure: membrane.save(figure, path))
+        for name, figure in figures().items()
+    }
+    generated.main(files, pictures)
