@@ -43,6 +43,23 @@ settings.register_profile(
 settings.load_profile("house")
 
 
+@pytest.fixture
+def command(capsys, monkeypatch):
+    """Run `bubbleskin` in this process; returns exit status, standard output and standard error."""
+    monkeypatch.delenv("BUBBLESKIN_DEVICE", raising=False)
+    monkeypatch.setenv("COLUMNS", "160")
+
+    def run(*arguments):
+        from bubbleskin.cli.command import main
+
+        with pytest.raises(SystemExit) as end:
+            main(list(map(str, arguments)))
+        out, err = capsys.readouterr()
+        return end.value.code, out, err
+
+    return run
+
+
 @pytest.fixture(scope="session")
 def micropython(tmp_path_factory):
     """`run(script, stdin="", timeout=60)`: what a script prints in the real MicroPython, with the board's heap.

@@ -1,6 +1,7 @@
 """`bubbleskin calibrate` as its user meets it."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,24 +9,14 @@ import pytest
 import bubbleskin as bs
 from bubbleskin.calibrate import archive
 from bubbleskin.calibrate.measure import Measured
-from bubbleskin.cli.command import main
 
 URL = "sim://wristband7?spread=0.1&rubber=real&contact=0&seed=3"
 
 
 @pytest.fixture
-def run(capsys, monkeypatch):
-    """Run the command; returns exit status, standard output and standard error."""
-    monkeypatch.delenv("BUBBLESKIN_DEVICE", raising=False)
-    monkeypatch.setenv("COLUMNS", "160")
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as end:
-            main(["calibrate", *map(str, arguments)])
-        out, err = capsys.readouterr()
-        return end.value.code, out, err
-
-    return run
+def run(command):
+    """Run the verb; returns exit status, standard output and standard error."""
+    return partial(command, "calibrate")
 
 
 @pytest.fixture(scope="session")
