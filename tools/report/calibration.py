@@ -2,6 +2,8 @@
 
     python tools/report/calibration.py
     python tools/report/calibration.py --sheets 4 --shows 5 --json
+    python tools/report/calibration.py --sheets 7 --alone                 # each bubble by itself, as after a swap
+    python tools/report/calibration.py --tables ecoflex-00-30 --extra sheet=ecoflex-00-30
 
 Each sheet is real rubber with everything ± 10 % (`docs/simulator.md`), fresh from the mould, its bubbles apart: no sheet, gas,
 valve or sensor is what the calibration's model has. The same random shapes from 5.5 to 13 mm are asked before and after, two in
@@ -38,6 +40,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="the first sheet's")
     parser.add_argument("--board", default="wristband7")
     parser.add_argument("--extra", default="", help="more of the URL, such as atmosphere_kpa=84")
+    parser.add_argument("--alone", action="store_true", help="calibrate each bubble by itself")
+    parser.add_argument("--tables", help="a preset whose tables are uploaded first")
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
     console = Console(stderr=True)
@@ -48,10 +52,10 @@ def main() -> int:
         task = bar.add_task("sheets", total=given.sheets)
         for seed in range(given.seed, given.seed + given.sheets):
             url = URL.format(board=given.board, seed=seed) + ("&" + given.extra if given.extra else "")
-            before += list(_shows(url, seed, given.shows, None))
-            after += list(_shows(url, seed, given.shows, facts))
+            before += list(_shows(url, seed, given, None))
+            after += list(_shows(url, seed, given, facts))
             bar.advance(task)
-    report = {"before": _figures(before), "after": _figures(after)} | _of_calibrations(facts)
+    report = {"before": _figures(before), "after": _figures(after), "sheets": given.sheets} | _of_calibrations(facts)
     if given.json:
         print(json.dumps(report, indent=2))
         return 0
@@ -59,14 +63,21 @@ def main() -> int:
     return 0
 
 
-def _shows(url: str, seed: int, shows: int, facts: list[dict[str, Any]] | None) -> Iterator[dict[str, Any]]:
+def _shows(
+    url: str, seed: int, given: argparse.Namespace, facts: list[dict[str, Any]] | None
+) -> Iterator[dict[str, Any]]:
     rng = np.random.default_rng((seed, 14))
     with bs.connect(url) as skin:
         skin.sleep(1.0)
+        if given.tables:
+            skin.upload_tables(bs.build_table(bs.preset(given.tables)))
         if facts is not None:
-            found = skin.calibrate(save=False)
-            facts.append({"seconds": found.device_s, "accepted": len(found.accepted), "bubbles": len(found.bubbles)})
-        for number in range(shows):
+            for bubble in range(skin.info.bubbles) if given.alone else [None]:
+                found = skin.calibrate(bubble, save=False)
+                facts.append(
+                    {"seconds": found.device_s, "accepted": len(found.accepted), "bubbles": len(found.bubbles)}
+                )
+        for number in range(given.shows):
             target = rng.uniform(LOW_MM, HIGH_MM, skin.info.bubbles)
             yield from _one(skin, target, TIMES_S if number % LONG_EVERY == 0 else TIMES_S[:2])
             if skin.faults():
@@ -122,7 +133,6 @@ def _figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _of_calibrations(facts: list[dict[str, Any]]) -> dict[str, Any]:
     return {
-        "sheets": len(facts),
         "device_s": max(one["seconds"] for one in facts),
         "accepted": sum(one["accepted"] for one in facts),
         "bubbles": sum(one["bubbles"] for one in facts),
