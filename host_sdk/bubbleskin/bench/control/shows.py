@@ -60,6 +60,8 @@ def hold(contender: Contender, target: NDArray[np.float64], seconds: float) -> S
         told.append(contender.told())
     contender.run(max(seconds - passed, 0.0))
     seen = _of_ticks(*board.seen(), start, target, contender.rest_mm, board.tick_s)
+    # A fault after the last look isolates its bubble, which is no vent-lock.
+    faulty = contender.told().faulty if seconds > passed else told[-1].faulty
     return Show(
         target=target,
         seconds=seconds,
@@ -67,7 +69,7 @@ def hold(contender: Contender, target: NDArray[np.float64], seconds: float) -> S
         told=np.array([one.height_mm for one in told]),
         sd=np.array([one.sd_mm for one in told]),
         settled=np.array([one.settled for one in told]),
-        faulty=told[-1].faulty,
+        faulty=faulty,
         **seen,
     )
 
