@@ -7,8 +7,9 @@ if TYPE_CHECKING:
     from bubbleskin.calibrate.result import BubbleCalibration, SelfCalibration
     from bubbleskin.connecting import aconnect, connect
     from bubbleskin.contact.fit import ContactFit, Measured, fit_contact
-    from bubbleskin.contact.model import CompliantContact, Shape
+    from bubbleskin.contact.model import CompliantContact
     from bubbleskin.contact.rigid import RigidContact
+    from bubbleskin.contact.shape import Shape
     from bubbleskin.device.faults import Fault
     from bubbleskin.device.health import Health, TickHistogram
     from bubbleskin.device.info import Info
@@ -84,7 +85,7 @@ _ROOMS = {
     "Sequence": "sequence.model",
     "Setting": "device.settings",
     "Settled": "sequence.steps",
-    "Shape": "contact.model",
+    "Shape": "contact.shape",
     "Skin": "skin",
     "State": "device.state",
     "Step": "sequence.steps",

@@ -6,11 +6,13 @@ A state is an (n, 4) array in m: centre x, y, z of each bubble and its outer rad
     ½ kxy |xy − barb|²                 the neck holds sideways
     ½ kz (z − R)²                      up the neck pulls softly (kz_up), down the base pushes (kz_down)
 
-and per pair ½ kc max(0, Ri + Rj − |ci − cj|)². `bubbles` is an array of `BUBBLE`, `springs` one `SPRINGS` record,
-`pairs` an (m, 2) array of those that could touch: the work grows with it. `mechanics` is necks, base and contact
-alone, for a plant that integrates membranes and air itself. All SI; nothing is checked, nothing allocated. The functions
-here are not cached on disk by themselves: `relax` caches what calls them, together with them. `docs/contact.md` explains
-the energy and where the springs come from.
+and per pair ½ kc max(0, Ri + Rj − |ci − cj|)². Where sizes are held and not pressures, ½ grip (R − held R)² stands for
+membrane and air: a wristband meters the air of each bubble, so that neighbours hardly make it smaller.
+
+`bubbles` is an array of `BUBBLE`, `springs` one `SPRINGS` record, `pairs` an (m, 2) array of those that could touch: the
+work grows with it. `mechanics` is necks, base and contact alone, for a plant that integrates membranes and air itself.
+All SI; nothing is checked, nothing allocated. The functions here are not cached on disk by themselves: `relax` caches what
+calls them, together with them. `docs/contact.md` explains the energy and where the springs come from.
 """
 
 import math
@@ -26,8 +28,8 @@ BUBBLE = np.dtype(
 )
 """Barb (m), Yeoh constants, wall, named rest radius, rest radii of inner and outer surface, and the kind of wall."""
 
-SPRINGS = np.dtype([(name, "f8") for name in ("kz_up", "kz_down", "kxy", "kc")])
-"""N/m."""
+SPRINGS = np.dtype([(name, "f8") for name in ("kz_up", "kz_down", "kxy", "kc", "grip")])
+"""N/m. `grip` is with which sizes are held; 0 where pressures are."""
 
 _energy_density = njit(wall.energy_density)
 _energy_slope = njit(wall.energy_slope)
@@ -97,21 +99,28 @@ def mechanics(state, bubbles, springs, pairs, gradient):  # type: ignore[no-unty
 
 
 @njit
-def gradient(state, pressure, bubbles, springs, pairs, out):  # type: ignore[no-untyped-def]
-    """Energy (J) of the whole at gauge `pressure`, (n,) Pa; its gradient goes to `out`, (n, 4) N."""
+def gradient(state, held, bubbles, springs, pairs, out):  # type: ignore[no-untyped-def]
+    """Energy (J) of the whole; its gradient goes to `out`, (n, 4) N.
+
+    `held`, (n,), is the gauge pressure in Pa, or with a `grip` the outer radius in m that each bubble would have alone.
+    """
     out[:] = 0.0
     E = mechanics(state, bubbles, springs, pairs, out)
     for i in range(len(state)):
         bubble, R = bubbles[i], state[i, 3]
+        if springs.grip > 0.0:
+            out[i, 3] += springs.grip * (R - held[i])
+            E += 0.5 * springs.grip * (R - held[i]) ** 2
+            continue
         U, P, _ = membrane(R, bubble)
         # Outside and inside bound the same rubber, so dV = 4π R² dR holds for a thick wall too.
-        out[i, 3] += 4.0 * math.pi * R * R * (P - pressure[i])
-        E += U - pressure[i] * 4.0 / 3.0 * math.pi * (R**3 - bubble.outer**3 + bubble.inner**3)
+        out[i, 3] += 4.0 * math.pi * R * R * (P - held[i])
+        E += U - held[i] * 4.0 / 3.0 * math.pi * (R**3 - bubble.outer**3 + bubble.inner**3)
     return E
 
 
 @njit
-def curvature(state, pressure, bubbles, springs, pairs, blocks, contacts):  # type: ignore[no-untyped-def]
+def curvature(state, held, bubbles, springs, pairs, blocks, contacts):  # type: ignore[no-untyped-def]
     """Prepare `hessian`: 4 by 4 `blocks` of each bubble, (n, 4, 4), and `contacts`, (m, 5).
 
     An entry of `contacts`: direction from j to i, curvature kc along it, and −force/distance across it (0, 0: no contact).
@@ -120,12 +129,15 @@ def curvature(state, pressure, bubbles, springs, pairs, blocks, contacts):  # ty
     for i in range(len(state)):
         R = state[i, 3]
         kz = springs.kz_up if state[i, 2] > R else springs.kz_down
-        _, P, dP = membrane(R, bubbles[i])
         block = blocks[i]
         block[0, 0] = block[1, 1] = springs.kxy
         block[2, 2] = kz
         block[2, 3] = block[3, 2] = -kz
-        block[3, 3] = kz + 4.0 * math.pi * R * (2.0 * (P - pressure[i]) + R * dP)
+        if springs.grip > 0.0:
+            block[3, 3] = kz + springs.grip
+        else:
+            _, P, dP = membrane(R, bubbles[i])
+            block[3, 3] = kz + 4.0 * math.pi * R * (2.0 * (P - held[i]) + R * dP)
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         contact = contacts[k]

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bubbleskin.checks import SEED_MAX, finite, instance, number, one_of, positive, whole
 from bubbleskin.contact import energy as core
-from bubbleskin.contact.continuation import FINE, Outcome, PathFollower, Resolution, Snap, ramps
+from bubbleskin.contact.continuation import FINE, Outcome, PathFollower, Resolution, ramps
 from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
+from bubbleskin.contact.shape import Contact, Shape
 from bubbleskin.errors import InvalidInput, NoEquilibrium
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
@@ -24,63 +24,11 @@ Ramp = Literal["pressure", "height"]
 KZ, KXY, KC, KBASE = 10.0, 50.0, 300.0, 3000.0
 """N/m. The preset: with these springs the model gives the paper's three heights (`tools/report/contact.py`)."""
 
+GRIP = 1e5
+"""N/m. How stiffly a wristband holds sizes: 1 N of its neighbours makes a bubble 0.02 mm smaller, as its law's dead band does."""
+
 LINE_VOLUME = 0.2e-6
 """m³ of air in valve node and tube of the simulated boards."""
-
-
-class Contact(NamedTuple):
-    """Two bubbles that push each other."""
-
-    first: int
-    second: int
-    force: float
-    """N, along the line between the centres."""
-    overlap_mm: float
-    """How far the spheres would reach into each other."""
-
-
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """A settled array. Arrays have one entry per bubble, in layout order."""
-
-    height_mm: Array
-    """Top of each bubble above the base plane, z + R, (n,)."""
-    position: Array
-    """Centres x, y, z in m, (n, 3)."""
-    stretch: Array
-    """λ of the balloon's named surface, (n,)."""
-    contacts: tuple[Contact, ...]
-    pressure: Array
-    """Gauge, Pa, (n,)."""
-    radius: Array
-    """Outer radius R in m, (n,)."""
-    snaps: tuple[Snap, ...]
-    """What lost its stability on the way here."""
-    energy: float
-    """J, necks, base, contact, membranes and air."""
-    residual: float
-    """Largest force left, N."""
-    converged: bool
-    increments: int
-    """Relaxations on the way here, halved increments included."""
-
-    def __repr__(self) -> str:
-        low, high = self.height_mm.min(), self.height_mm.max()
-        end = "settled" if self.converged else f"not at rest, {self.residual:.2g} N left"
-        return f"<Shape of {len(self)} bubbles, {low:.2f} to {high:.2f} mm, {len(self.contacts)} contacts, {end}>"
-
-    def __len__(self) -> int:
-        return len(self.height_mm)
-
-    @property
-    def lifted_mm(self) -> Array:
-        """How far each bubble's lowest point is off the base plane, (n,)."""
-        return np.asarray(1e3 * np.maximum(self.position[:, 2] - self.radius, 0.0))
-
-    @property
-    def state(self) -> Array:
-        """x, y, z, R of each bubble in m, (n, 4): what `energy.py` works on."""
-        return np.column_stack([self.position, self.radius])
 
 
 class CompliantContact:
@@ -126,9 +74,9 @@ class CompliantContact:
         return len(self.layout)
 
     @property
-    def springs(self) -> tuple[float, float, float, float]:
-        """`kz`, `kbase`, `kxy`, `kc`, as in `energy.SPRINGS`."""
-        return self.kz, self.kbase, self.kxy, self.kc
+    def springs(self) -> tuple[float, float, float, float, float]:
+        """`kz`, `kbase`, `kxy`, `kc` and no grip, as in `energy.SPRINGS`."""
+        return self.kz, self.kbase, self.kxy, self.kc, 0.0
 
     def with_seed(self, seed: int) -> CompliantContact:
         """The same model with other random nudges."""
@@ -166,27 +114,16 @@ class CompliantContact:
         `strict` that raises `NoEquilibrium`. Raises `InvalidInput` for pressures that no bubble holds.
         """
         targets = self._pressures(steps)
-        if resolution.increments < 1:
-            raise InvalidInput(f"A step is followed in 1 or more increments; {resolution.increments} were asked.")
-        positive("move_mm", number("move_mm", resolution.move_mm), "mm")
         one_of("ramp", ramp, ("pressure", "height"))
-        if start is not None and len(start) != len(self):
-            raise InvalidInput(f"The shape to start from has {len(start)} bubbles, the layout {len(self)}.")
+        self._check(start, resolution)
         begin = np.zeros(len(self)) if start is None else start.pressure
         radii: list[Array] | None = None
         if ramp == "height":
             radii = [self.free_radius(begin, None if start is None else start.radius)]
             for target in targets:
                 radii.append(self.free_radius(target, radii[-1]))
-        state = self._flat() if start is None else start.state
-        follower = PathFollower(
-            self.bubbles, self.springs, state, kick=self.kick, seed=self.seed, resolution=resolution
-        )
         path = ramps(begin, targets, None if radii is None else np.array(radii), self.bubbles)
-        for step, pressures in enumerate(path):
-            follower.follow(step, pressures)
-            if follower.ended != CONVERGED:
-                break
+        follower, step = self._followed(path, start, self.springs, resolution)
         shape = self._shape(follower.outcome(), targets[-1], follower.pairs)
         if strict and not shape.converged:
             how = "a bubble grows without end" if follower.ended == BURST else f"{shape.residual:.1e} N are left"
@@ -194,6 +131,57 @@ class CompliantContact:
                 f"No equilibrium on the way to step {step}: {how}. Ask for less pressure, or follow in more increments."
             )
         return shape
+
+    def settle_sizes(self, sizes_mm: ArrayLike, start: Shape | None = None, *, resolution: Resolution = FINE) -> Shape:
+        """Follow `sizes_mm`, (k, n): the height that each bubble would have alone, as a wristband holds it among others.
+
+        A wristband meters the air of each bubble, so that its neighbours raise its pressure and push it aside or up, but
+        hardly make it smaller. `Shape.pressure` is what its sensor then says. On the way to a step all sizes go straight.
+        Raises `InvalidInput` for sizes below the rest height or of another number of bubbles.
+        """
+        radii = 0.5e-3 * np.atleast_2d(finite("sizes_mm", sizes_mm))
+        if radii.ndim != 2 or radii.shape[1] != len(self) or not len(radii):
+            raise InvalidInput(
+                f"Sizes are a (k, {len(self)}) array, a height alone in mm per bubble and step; this one is {radii.shape}."
+            )
+        if (radii < 0.99 * self.bubbles["outer"]).any() or (radii > 4.0 * self.bubbles["outer"]).any():
+            raise InvalidInput("A size is below a bubble's rest height, or above four times that.")
+        self._check(start, resolution)
+        begin = self.bubbles["outer"] if start is None else start.radius
+        springs = (*self.springs[:4], GRIP)
+        follower, _ = self._followed(ramps(begin, radii, None, self.bubbles), start, springs, resolution)
+        outcome = follower.outcome()
+        return self._shape(outcome, self._pressure_at(outcome.state[:, 3], radii[-1]), follower.pairs)
+
+    def _pressure_at(self, radius: Array, held: Array) -> Array:
+        """Pa inside of bubbles whose radius is `radius` (m) among their neighbours and would be `held` (m) alone."""
+        alone = np.empty(len(self))
+        hold(np.maximum(radius, self.bubbles["outer"]), self.bubbles, alone)
+        return np.maximum(alone, 0.0) + GRIP * (held - radius) / (4 * np.pi * radius**2)
+
+    def _followed(
+        self,
+        path: Iterable[Callable[[float], Array]],
+        start: Shape | None,
+        springs: tuple[float, ...],
+        resolution: Resolution,
+    ) -> tuple[PathFollower, int]:
+        """A follower at the end of `path`, and the step that it came to."""
+        state = self._flat() if start is None else start.state
+        follower = PathFollower(self.bubbles, springs, state, kick=self.kick, seed=self.seed, resolution=resolution)
+        step = 0
+        for step, held in enumerate(path):
+            follower.follow(step, held)
+            if follower.ended != CONVERGED:
+                break
+        return follower, step
+
+    def _check(self, start: Shape | None, resolution: Resolution) -> None:
+        if resolution.increments < 1:
+            raise InvalidInput(f"A step is followed in 1 or more increments; {resolution.increments} were asked.")
+        positive("move_mm", number("move_mm", resolution.move_mm), "mm")
+        if start is not None and len(start) != len(self):
+            raise InvalidInput(f"The shape to start from has {len(start)} bubbles, the layout {len(self)}.")
 
     def free_radius(self, pressure: ArrayLike, near: ArrayLike | None = None) -> Array:
         """Outer radius (m) of each bubble if it stood alone at `pressure`, (n,) Pa.
@@ -241,11 +229,20 @@ class CompliantContact:
         From the implicit function theorem: H ds = 4π R² dP e, H the second derivatives of the energy. Raises
         `NoEquilibrium` if `shape` is not a stable one.
         """
+        return self._slope(shape, self.springs, shape.pressure, 4 * np.pi * shape.radius**2)
+
+    def size_slope(self, shape: Shape) -> Array:
+        """∂height/∂size of the settled `shape` where sizes are held, (n, n) mm/mm; as `height_slope`."""
+        springs = (*self.springs[:4], GRIP)
+        return self._slope(shape, springs, shape.radius, np.full(len(self), 0.5 * GRIP))
+
+    def _slope(self, shape: Shape, springs: tuple[float, ...], held: Array, force: Array) -> Array:
+        """∂height by what is `held`, (n, n); `force`, (n,), is by how much a radius is pushed per unit of it."""
         n = len(self)
         rhs, out = np.zeros((n, n, 4)), np.zeros((n, n, 4))
-        rhs[np.arange(n), np.arange(n), 3] = 4 * np.pi * shape.radius**2
-        at = self._follower_at(shape.state)
-        if not solve(shape.state, shape.pressure, self.bubbles, at.springs, at.pairs, rhs, out, 1e-9):
+        rhs[np.arange(n), np.arange(n), 3] = force
+        at = self._follower_at(shape.state, springs)
+        if not solve(shape.state, held, self.bubbles, at.springs, at.pairs, rhs, out, 1e-9):
             raise NoEquilibrium("The shape is about to snap: its heights have no slope. Change a pressure a little.")
         return np.asarray((out[:, :, 2] + out[:, :, 3]).T)
 
@@ -260,12 +257,12 @@ class CompliantContact:
     def _evaluate(self, state: Array, pressure: ArrayLike) -> tuple[float, Array]:
         state = np.ascontiguousarray(state, dtype=float)
         p = np.array(np.broadcast_to(np.asarray(pressure, dtype=float), (len(self),)))
-        at, out = self._follower_at(state), np.empty_like(state)
+        at, out = self._follower_at(state, self.springs), np.empty_like(state)
         return float(evaluate(state, p, self.bubbles, at.springs, at.pairs, out)), out
 
-    def _follower_at(self, state: Array) -> PathFollower:
+    def _follower_at(self, state: Array, springs: tuple[float, ...]) -> PathFollower:
         """A follower at `state` that knows all pairs which touch there."""
-        follower = PathFollower(self.bubbles, self.springs, state)
+        follower = PathFollower(self.bubbles, springs, state)
         follower.find_pairs_of_state()
         return follower
 

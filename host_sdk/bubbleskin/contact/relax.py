@@ -233,19 +233,19 @@ def _merit(E, new_E, saved, force, new_force):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace):  # type: ignore[no-untyped-def]
+def _relax(state, held, bubbles, springs, pairs, radius, tolerance, trace):  # type: ignore[no-untyped-def]
     n, m, limit = len(state), len(pairs), len(trace) - 1
     g, trial, new_g, s = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4))
     at = Curvature(pairs, np.empty((n, 4, 4)), np.empty((m, 5)), np.empty((n, 4, 4)))
     work = np.empty((4, n, 4))
-    E = gradient(state, pressure, bubbles, springs, pairs, g)
+    E = gradient(state, held, bubbles, springs, pairs, g)
     trace[0] = E
     force = largest(g)
     first, trust = max(force, tolerance), radius
     ended, unstable, fresh, steps = EXHAUSTED, False, False, 0
     while force > tolerance and steps < limit:
         if not fresh:
-            curvature(state, pressure, bubbles, springs, pairs, at.blocks, at.contacts)
+            curvature(state, held, bubbles, springs, pairs, at.blocks, at.contacts)
             invert(at.blocks, at.inverses)
             fresh = True
         accuracy = min(0.1, math.sqrt(force / first))
@@ -255,7 +255,7 @@ def _relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace): 
         place = _place(state, s, bubbles, trial)
         ratio = -1.0
         if place == _IN_RANGE:
-            new_E = gradient(trial, pressure, bubbles, springs, pairs, new_g)
+            new_E = gradient(trial, held, bubbles, springs, pairs, new_g)
             new_force = largest(new_g)
             ratio = _merit(E, new_E, saved, force, new_force)
             if ratio > 0.0 and (ratio > 1e-4 or new_force < force):
@@ -283,11 +283,11 @@ def _next_trust(trust, ratio, edge, radius):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _solve(state, pressure, bubbles, springs, pairs, rhs, out, accuracy):  # type: ignore[no-untyped-def]
+def _solve(state, held, bubbles, springs, pairs, rhs, out, accuracy):  # type: ignore[no-untyped-def]
     n, m = len(state), len(pairs)
     at = Curvature(pairs, np.empty((n, 4, 4)), np.empty((m, 5)), np.empty((n, 4, 4)))
     work = np.empty((4, n, 4))
-    curvature(state, pressure, bubbles, springs, pairs, at.blocks, at.contacts)
+    curvature(state, held, bubbles, springs, pairs, at.blocks, at.contacts)
     invert(at.blocks, at.inverses)
     good, g = True, np.empty((n, 4))
     for k in range(len(rhs)):
@@ -318,26 +318,26 @@ def _entries(stamp: int):  # type: ignore[no-untyped-def]
     """
 
     @njit(cache=True)
-    def relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace):  # type: ignore[no-untyped-def]
-        """Relax `state`, (n, 4) m, in place at `pressure`, (n,) Pa; no step moves a bubble further than `radius` (m).
+    def relax(state, held, bubbles, springs, pairs, radius, tolerance, trace):  # type: ignore[no-untyped-def]
+        """Relax `state`, (n, 4) m, in place; `held` as of `gradient`. No step moves a bubble further than `radius` (m).
 
         `tolerance` (N) is the goal of the largest force; `trace`, (k + 1,), gets the energy (J) after each of at most k
         steps. Returns how it ended, the largest force left (N), the steps taken, and whether curvature was ever negative.
         """
         _ = stamp
-        return _relax(state, pressure, bubbles, springs, pairs, radius, tolerance, trace)
+        return _relax(state, held, bubbles, springs, pairs, radius, tolerance, trace)
 
     @njit(cache=True)
-    def solve(state, pressure, bubbles, springs, pairs, rhs, out, accuracy):  # type: ignore[no-untyped-def]
+    def solve(state, held, bubbles, springs, pairs, rhs, out, accuracy):  # type: ignore[no-untyped-def]
         """`out` = H⁻¹ rhs for k right-hand sides, both (k, n, 4), at a stable equilibrium; False if it is none."""
         _ = stamp
-        return _solve(state, pressure, bubbles, springs, pairs, rhs, out, accuracy)
+        return _solve(state, held, bubbles, springs, pairs, rhs, out, accuracy)
 
     @njit(cache=True)
-    def evaluate(state, pressure, bubbles, springs, pairs, out):  # type: ignore[no-untyped-def]
+    def evaluate(state, held, bubbles, springs, pairs, out):  # type: ignore[no-untyped-def]
         """`energy.gradient`."""
         _ = stamp
-        return gradient(state, pressure, bubbles, springs, pairs, out)
+        return gradient(state, held, bubbles, springs, pairs, out)
 
     @njit(cache=True)
     def hold(radius, bubbles, out):  # type: ignore[no-untyped-def]

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from bubbleskin.contact.continuation import Resolution
-from bubbleskin.contact.model import CompliantContact, Shape
+from bubbleskin.contact.model import CompliantContact
+from bubbleskin.contact.shape import Shape
 from bubbleskin.errors import NoEquilibrium
 
 Array = NDArray[np.float64]

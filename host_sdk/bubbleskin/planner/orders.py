@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.contact.model import Shape
+from bubbleskin.contact.shape import Shape
 
 Array = NDArray[np.float64]
 Group = frozenset[int]

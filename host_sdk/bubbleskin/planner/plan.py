@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bubbleskin.contact.model import Shape
+from bubbleskin.contact.shape import Shape
 from bubbleskin.layout import Layout
 from bubbleskin.planner.orders import Order
 from bubbleskin.sequence.model import Sequence

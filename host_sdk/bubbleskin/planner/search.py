@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from bubbleskin.checks import instance, number, positive
 from bubbleskin.contact.continuation import FINE, Resolution
-from bubbleskin.contact.model import CompliantContact, Shape, balloons_of
+from bubbleskin.contact.model import CompliantContact, balloons_of
+from bubbleskin.contact.shape import Shape
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon

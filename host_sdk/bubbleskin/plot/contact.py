@@ -16,7 +16,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from bubbleskin.contact.model import CompliantContact, Contact, Shape
+from bubbleskin.contact.model import CompliantContact
+from bubbleskin.contact.shape import Contact, Shape
 from bubbleskin.layout import Layout
 from bubbleskin.plot.membrane import COLOURS, STYLE
 
