@@ -265,12 +265,10 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 else:
                     segment = row[_FIRST_SEGMENT]
                     knot = ptr32(uint(curves) + segment)
-                    believed = air
+                    was = air
                     air = (pressure + atmosphere >> 4) * knot[_KNOT_VOLUME] >> 12
-                    # What was learned of the curve at an air that was not there is wrong, too.
-                    wrong = (
-                        _AIR_SD_FAR - believed + air | _AIR_SD_FAR + believed - air
-                    ) >> 31  # -1 where it was, else 0
+                    # What was learned of the curve at an air that was not there is wrong, too: -1 then, else 0.
+                    wrong = (_AIR_SD_FAR - was + air | _AIR_SD_FAR + was - air) >> 31
                     row[_CURVE_ERROR] = row[_CURVE_ERROR] & ~wrong
                     row[_CURVE_ERROR_SD] = row[_CURVE_ERROR_SD] + (row[_CURVE_SD] - row[_CURVE_ERROR_SD] & wrong)
                     row[_AIR_SD] = _AIR_SD_EMPTY
