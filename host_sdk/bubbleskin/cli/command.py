@@ -12,6 +12,7 @@ import click
 from bubbleskin.cli import (
     bench,
     calibrate,
+    demonstrations,
     device,
     doctor,
     firmware,
@@ -38,6 +39,7 @@ def bubbleskin() -> None:
 
 
 for _command in (
+    *demonstrations.commands,
     *device.commands,
     *doctor.commands,
     *play.commands,

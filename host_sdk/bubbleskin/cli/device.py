@@ -23,7 +23,7 @@ from bubbleskin.shape.heightfield import FILLS, Heights
 from bubbleskin.skin import Skin
 
 
-@click.command()
+@click.group(invoke_without_command=True)
 @click.option(
     "--device",
     envvar="BUBBLESKIN_DEVICE",
@@ -39,8 +39,14 @@ from bubbleskin.skin import Skin
     show_default=True,
     help="The picture.",
 )
-def demo(device: str, output: Path) -> None:
-    """Show a dome, then a tilted plane; print heights asked and reached; save a picture."""
+@click.pass_context
+def demo(context: click.Context, device: str, output: Path) -> None:
+    """Show a dome, then a tilted plane; print heights asked and reached; save a picture.
+
+    The demonstrations of the paper are commands of their own, below.
+    """
+    if context.invoked_subcommand:
+        return
     from bubbleskin.plot.array import draw_shows
 
     console = Console()
@@ -169,4 +175,4 @@ def show(way: _Way, over: float, hold: float, device: str | None, json: bool) ->
         skin.sleep(hold)
 
 
-commands = [demo, info, show]
+commands = [info, show]

@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.columns import Columns
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -95,23 +96,38 @@ class Monitor:
         return "".join(_BLOCKS[step] for step in steps).ljust(_HISTORY)
 
     def _top(self, state: State) -> Text:
-        """The array from above: heights where the bubbles are, brighter the higher."""
-        x, y = self._layout.positions_mm.T
-        pitch = self._layout.pitch_mm
-        columns = np.rint((x - x.min()) / pitch * 8).astype(int)
-        rows = np.rint((y.max() - y) / pitch * 2).astype(int)
-        low, high = self._info.height_rest_mm, self._info.height_max_mm
-        text = Text()
-        for line in range(int(rows.max()) + 1):
-            at = 0
-            for bubble in sorted(np.flatnonzero(rows == line), key=lambda bubble: columns[bubble]):
-                share = np.clip((state.height_mm[bubble] - low) / (high - low), 0, 1)
-                shade = round(60 + 195 * float(np.nan_to_num(share)))
-                style = (
-                    f"black on rgb({shade},{shade // 2},{255 - shade})" if not state.faults[bubble] else "white on red"
-                )
-                text.append(" " * (columns[bubble] - at))
-                text.append(f"{state.height_mm[bubble]:5.1f} ", style=style)
-                at = columns[bubble] + 6
-            text.append("\n")
-        return text
+        ill = frozenset(bubble for bubble, faults in enumerate(state.faults) if faults)
+        limits = self._info.height_rest_mm, self._info.height_max_mm
+        return from_above(self._layout, state.height_mm, limits, ill)
+
+
+def from_above(
+    layout: Layout,
+    heights_mm: NDArray[np.float64],
+    limits_mm: tuple[float, float],
+    ill: frozenset[int] = frozenset(),
+    marked: int | None = None,
+) -> Text:
+    """The array from above: heights where the bubbles are, brighter the higher; `ill` ones red, the `marked` one underlined."""
+    x, y = layout.positions_mm.T
+    pitch = layout.pitch_mm
+    columns = np.rint((x - x.min()) / pitch * 8).astype(int)
+    rows = np.rint((y.max() - y) / pitch * 2).astype(int)
+    text = Text()
+    for line in range(int(rows.max()) + 1):
+        at = 0
+        for bubble in sorted(np.flatnonzero(rows == line), key=lambda bubble: columns[bubble]):
+            style = f"black on {shade(heights_mm[bubble], limits_mm)}" if bubble not in ill else "white on red"
+            text.append(" " * (columns[bubble] - at))
+            text.append(f"{heights_mm[bubble]:5.1f} ", style=f"bold underline {style}" if bubble == marked else style)
+            at = columns[bubble] + 6
+        text.append("\n")
+    return text
+
+
+def shade(height_mm: float, limits_mm: tuple[float, float]) -> str:
+    """The colour of a height in a terminal, from blue to orange, brighter the higher."""
+    low, high = limits_mm
+    share = float(np.nan_to_num(np.clip((height_mm - low) / (high - low), 0, 1)))
+    level = round(60 + 195 * share)
+    return f"rgb({level},{level // 2},{255 - level})"
