@@ -1,4 +1,4 @@
-# make demo: see it. make test: every check that needs no hardware, some 20 minutes on two cores. make check: the everyday ones, some three.
+# make demo: see it. make test: every check that needs no hardware, some 20 minutes on two cores. make check: the quick ones, about one.
 
 PYTHON ?= python3
 VENV := .venv
@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 GENERATORS := packed_schema constants nominal_table golden_vectors protocol_page cli_page boards_page state_page fault_page plant_page demo_picture membrane_pictures contact_pictures control_page control_pictures calibration_picture
 EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
+QUICK := -n 2 -m "not medium and not slow and not chip" --ignore tests/house --ignore docs/calibration.md
 COVERED := tests/bench tests/boards tests/cli tests/contact tests/flash tests/native tests/sdk
 UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
@@ -53,9 +54,9 @@ chip-long: setup micropython ## what takes longer on an emulated chip
 	$(BIN)/bubbleskin firmware build
 	$(BIN)/python -m pytest -n 2 -m "chip and long"
 
-check: setup lint ## the everyday checks: lint, types, imports, rules, tests of about a second and less; some three minutes
-	@echo "the everyday tests: about a second each and less, 20 examples of each property; those that take longest are named"
-	BUBBLESKIN_EXAMPLES=20 $(BIN)/python -m pytest -q $(EVERYDAY) --durations=5 --durations-min=2
+check: setup lint ## lint, types, imports, rules, and the tests that take less than half a second: about a minute
+	@echo "the quick tests, 20 examples of each property; one that takes a second is named, and wants the mark medium"
+	BUBBLESKIN_EXAMPLES=20 $(BIN)/python -m pytest -q $(QUICK) --durations=5 --durations-min=1
 
 lint: setup ## style, types, import contracts, the rules of tests/house
 	$(BIN)/ruff check

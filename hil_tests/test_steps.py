@@ -34,6 +34,7 @@ def check_step(skin, watch, pressed, start, target):
     return seen.height_mm[-1]
 
 
+@pytest.mark.medium
 @pytest.mark.long
 def test_extremes_in_a_row(skin, watch, pressed):
     n = skin.info.bubbles
@@ -43,6 +44,7 @@ def test_extremes_in_a_row(skin, watch, pressed):
         heights = check_step(skin, watch, pressed, heights, target)
 
 
+@pytest.mark.medium
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_random_heights_in_a_row(skin, watch, pressed, seed):
@@ -104,6 +106,7 @@ def test_each_bubble_goes_its_own_way(skin):
         assert np.argmax(state.pressure_kpa) == bubble
 
 
+@pytest.mark.medium
 @pytest.mark.long
 @pytest.mark.parametrize("over", [1.0, 3.0])
 @pytest.mark.parametrize(("low", "high"), [(5.5, 6.9), (9.2, 12.5)])

@@ -8,6 +8,7 @@ pytestmark = pytest.mark.timeout(60)
 NO_PRESSURE_KPA = 0.4  # sensor noise is 50 Pa
 
 
+@pytest.mark.medium
 @pytest.mark.long
 def test_vent_empties_every_bubble_within_a_second(skin):
     n = skin.info.bubbles

@@ -43,6 +43,7 @@ def test_a_sheet_is_its_seed():
     assert (first.parameters.mu != other.parameters.mu).all()
 
 
+@pytest.mark.medium
 def test_a_calibration_is_a_little_off():
     fill, vent, line = [], [], []
     for seed in range(30):
@@ -91,6 +92,7 @@ def test_the_first_law_loses_real_rubber_and_the_firmware_does_not():
     assert errors[PRESENT] < 0.3 < errors[FIRST]
 
 
+@pytest.mark.medium
 def test_the_fastest_fill_is_the_plant_s_own():
     board = Present(sheet(IDEAL, 1)).board
     before = board.alone_mm
@@ -110,6 +112,7 @@ def figures():
     return [replace(found[2], fill_ratio=np.inf), *found[:2], *found[3:]]
 
 
+@pytest.mark.medium
 def test_the_page_shows_the_file_and_check_says_where_not(tmp_path):
     (tmp_path / "docs/data").mkdir(parents=True)
     (tmp_path / page.PAGE).write_text(f"before\n{page.BEGIN}old\n{page.END}after\n", encoding="utf-8")

@@ -35,6 +35,7 @@ def test_layouts_of_ours_are_the_hexagons():
     assert bs.Layout.of_board("wristband19").neighbours == bs.Layout.hexagon(2).neighbours
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("field", [*FIELDS, *EXPANDER_FIELDS], ids=lambda field: field.name)
 def test_a_number_that_is_missing_wrong_or_beyond_is_named(field, pad8):
     whole = pad8.read_text(encoding="utf-8")

@@ -79,6 +79,7 @@ def test_its_tables_go_to_the_device_and_come_back(pad8):
             assert np.array_equal(sent.height_um, received.height_um)
 
 
+@pytest.mark.medium
 def test_the_command_line_knows_it(pad8, capsys):
     told = command(capsys, "plan", "--shape", "dome", "--board", pad8)
     assert len(told["predicted_mm"]) == 8

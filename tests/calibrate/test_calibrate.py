@@ -7,6 +7,8 @@ import bubbleskin as bs
 from bubbleskin.calibrate import device, excite
 from bubbleskin.calibrate.fit import FILL, NAMES, VENT
 
+pytestmark = pytest.mark.medium  # for the calibration that they share
+
 BOARD = "wristband7"
 
 

@@ -12,6 +12,8 @@ import bubbleskin as bs
 from bubbleskin.calibrate import archive
 from bubbleskin.calibrate.measure import Measured
 
+pytestmark = pytest.mark.medium  # for the calibration that they share
+
 
 @pytest.fixture(scope="session")
 def path(done, tmp_path_factory):

@@ -10,6 +10,8 @@ import pytest
 
 import bubbleskin as bs
 
+pytestmark = pytest.mark.medium  # for the calibration that they share
+
 pytestmark = pytest.mark.slow
 
 

@@ -2,9 +2,13 @@
 
 from dataclasses import replace
 
+import pytest
+
 from bubbleskin.calibrate.result import BubbleCalibration
 from bubbleskin.calibrate.verdict import Verdict
 from bubbleskin.plot import calibration as pictures
+
+pytestmark = pytest.mark.medium  # for the calibration that they share
 
 
 def test_every_bubble_has_a_panel(done, tmp_path):

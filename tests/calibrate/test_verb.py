@@ -10,6 +10,8 @@ import bubbleskin as bs
 from bubbleskin.calibrate import archive
 from bubbleskin.calibrate.measure import Measured
 
+pytestmark = pytest.mark.medium  # for the calibration that they share
+
 URL = "sim://wristband7?spread=0.1&rubber=real&contact=0&seed=3"
 
 

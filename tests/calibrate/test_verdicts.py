@@ -8,6 +8,8 @@ from bubbleskin.calibrate import verdict
 from bubbleskin.calibrate.nominal import Nominal
 from bubbleskin.calibrate.trace import Trace
 
+pytestmark = pytest.mark.medium  # for the calibration that they share
+
 NOMINAL = Nominal.of(boards.load("wristband7"))
 ODD = 3
 

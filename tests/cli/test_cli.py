@@ -74,6 +74,7 @@ def test_a_devices_failure_is_one_sentence_and_status_1(run, device, words):
     assert_one_sentence(run("info", "--device", device), 1, *words)
 
 
+@pytest.mark.medium
 def test_what_is_no_wristband_is_named_as_such(run):
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
@@ -155,6 +156,7 @@ def test_sim_serves_other_programs_until_it_is_interrupted():
     assert err.strip() == "Stopped."
 
 
+@pytest.mark.medium
 def test_tables_go_to_the_wristband_and_come_back(run, tmp_path):
     theirs, ours, mixed = (str(tmp_path / name) for name in ("theirs.toml", "ours.toml", "mixed.toml"))
     assert run("table", "--preset", "paper", "--mu-kpa", "45", "-o", ours, "--upload", *SIM)[0] == 0
@@ -168,6 +170,7 @@ def test_tables_go_to_the_wristband_and_come_back(run, tmp_path):
     assert "this is a wristband7" in wrong[2]
 
 
+@pytest.mark.medium
 def test_tables_that_look_wrong_are_uploaded_anyway(run, tmp_path):
     odd = str(tmp_path / "odd.toml")
     straight = bs.Table([5000, 14000], [0, 36000])

@@ -18,6 +18,7 @@ def run(folder, *arguments):
     return subprocess.run([*RUN, *arguments], env=environment, capture_output=True, text=True, timeout=500)
 
 
+@pytest.mark.medium
 def test_it_says_what_is_ready(tmp_path):
     done = run(tmp_path, "doctor", "--json")
     assert done.returncode == 0

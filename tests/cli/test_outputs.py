@@ -22,6 +22,7 @@ pytestmark = pytest.mark.skipif(not FULL.exists(), reason="a full disk is simula
 VERBS = ("info", "info --json", "show --all 8", "monitor --json --seconds 0.2", "play pulse --loops 1")
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_full_standard_output(verb):
     with FULL.open("w") as full:
@@ -53,6 +54,7 @@ def test_a_full_disk(write, tmp_path):
     assert [other.name for other in tmp_path.iterdir()] == ["x"], "nothing else is left"
 
 
+@pytest.mark.medium
 def test_a_file_that_was_there_stays_when_the_disk_is_full(tmp_path):
     path = tmp_path / "x.txt"
     path.write_text("what was there")
@@ -69,6 +71,7 @@ write_text({str(path)!r}, "x" * 5000, "the text")
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.medium
 def test_a_recording_on_a_disk_that_fills_ends_with_a_whole_row(tmp_path):
     path = tmp_path / "x.csv"
     done = subprocess.run(

@@ -14,12 +14,14 @@ def run(capsys, *arguments):
     return end.value.code, said.out, said.err
 
 
+@pytest.mark.medium
 def test_a_plan_is_printed_and_explained(capsys):
     status, out, _ = run(capsys, "plan", "13.9", *["11.88"] * 6)
     assert status == 0
     assert "Bubble 0 goes first" in out
 
 
+@pytest.mark.medium
 def test_json_has_what_to_send(capsys):
     status, out, _ = run(capsys, "plan", "--shape", "dome", "--board", "wristband19", "--json")
     facts = json.loads(out)
@@ -51,6 +53,7 @@ def test_mistakes_are_one_line_and_status_2(capsys, arguments, words):
     assert len(err.strip().splitlines()) == 1
 
 
+@pytest.mark.medium
 def test_the_picture_is_drawn(capsys, tmp_path):
     path = tmp_path / "plan.png"
     status, _, err = run(capsys, "plan", "13.9", *["11.88"] * 6, "--plot", str(path))

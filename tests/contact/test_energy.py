@@ -32,6 +32,7 @@ def model(request):
     return bs.CompliantContact(bs.Layout.hexagon(1), BALLOONS[request.param])
 
 
+@pytest.mark.medium
 def test_gradient_is_that_of_the_energy(model):
     """Central differences of fourth order, to 1e-6 of the largest force."""
     rng = np.random.default_rng(1)
@@ -69,6 +70,7 @@ def test_curvature_is_that_of_the_gradient(model):
         np.testing.assert_allclose(Hv, numeric, rtol=0, atol=2e-6 * np.abs(Hv).max())
 
 
+@pytest.mark.medium
 def test_energy_is_the_sum_of_its_terms():
     """Against the formula of docs/contact.md, spelled out in sympy for two bubbles that touch, one of them off its base."""
     x, y, z, R, u, v, w, S = sympy.symbols("x y z R u v w S", real=True)
@@ -95,6 +97,7 @@ def test_energy_is_the_sum_of_its_terms():
     np.testing.assert_allclose(model.gradient(state, [P, Q]).ravel(), derived, rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.medium
 def test_membrane_is_the_physics_one(model):
     balloon, radius = model.balloons[0], np.linspace(1.02, 2.8, 40) * model.balloons[0].outer_radius
     stretch = balloon.stretch_at_height(2 * radius)
@@ -121,6 +124,7 @@ def test_energy_never_rises_along_a_relaxation(model):
         assert np.diff(energy).max() <= 1e-13 * np.abs(energy).max()
 
 
+@pytest.mark.medium
 def test_plant_needs_only_the_mechanics():
     """What `mechanics` leaves out is air against membrane, along R alone."""
     model = bs.CompliantContact(bs.Layout.hexagon(1))

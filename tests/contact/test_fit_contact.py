@@ -22,6 +22,7 @@ def made(kz, kxy, kc, rng=None):
         yield bs.Measured(path, height if rng is None else height + rng.normal(0, 0.02, 3))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("true", [(10, 50, 300), (14, 60, 220)])
 def test_known_springs_are_recovered(true):
     fit = bs.fit_contact(made(*true), LAYOUT, sd_mm=0.005)

@@ -12,6 +12,7 @@ RIGID = bs.RigidContact(bs.Layout.hexagon(1))
 radii = st.lists(st.floats(2.5, 8.0), min_size=7, max_size=7).map(np.array)
 
 
+@pytest.mark.medium
 @given(radii, st.permutations(range(7)), st.integers(0, 6))
 def test_nobody_overlaps_and_nobody_gets_more_than_asked(wanted, order, cut):
     found = RIGID.inflate(wanted, [*order[:cut], order[cut:]])

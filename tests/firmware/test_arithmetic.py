@@ -197,6 +197,7 @@ def extreme_tables(chance):
         yield [*[knot for knot in knots if knot[0] < 13000 or knot[1] <= 40000], (top, chance.randrange(40001))]
 
 
+@pytest.mark.medium
 @pytest.mark.usefixtures("checked")
 @pytest.mark.parametrize("seed", range(2))
 def test_nothing_overflows_32_bits(rig7, seed):

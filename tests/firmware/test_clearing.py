@@ -23,6 +23,7 @@ FAILURES = [
 ]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("pace", PACES)
 @pytest.mark.parametrize(("failure", "value", "fault"), FAILURES)
 def test_clearing_at_any_pace_keeps_true_pressure_and_height_within_their_limits(attack, failure, value, fault, pace):
@@ -37,6 +38,7 @@ def test_clearing_at_any_pace_keeps_true_pressure_and_height_within_their_limits
     assert attacked.app.stats.exceptions == 0
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("pace", PACES)
 def test_clearing_at_any_pace_leaves_the_budget_what_it_is(attack, pace):
     attacked = attack(pace, (13000,), budget=10)

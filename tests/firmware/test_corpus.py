@@ -28,6 +28,7 @@ def test_the_corpus_reaches_every_request(target):
     assert seen >= {4, 8, 9, 10, 11, 12}
 
 
+@pytest.mark.medium
 def test_no_input_of_the_corpus_does_harm(target):
     for line in CORPUS:
         target.one_input(bytes.fromhex(line))

@@ -307,6 +307,7 @@ def test_no_bytes_harm_the_firmware(micropython, bytes_, mutations, requests):
     assert messages.TELEMETRY == 0x07
 
 
+@pytest.mark.medium
 def test_every_well_formed_frame_is_answered_once(rig):
     """Here, where an integer too large for its place is an exception: any id, any payload."""
     chance = random.Random(2)

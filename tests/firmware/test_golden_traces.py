@@ -174,6 +174,7 @@ def assert_golden(trace, firmware):
     return told
 
 
+@pytest.mark.medium
 @each_trace
 def test_this_interpreter_decides_as_recorded(trace):
     assert_golden(trace, InProcessFirmware(boards.load(trace["board"]), BOOT_ID))

@@ -17,6 +17,7 @@ def hostile():
     return tool
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("inputs", [300, pytest.param(10_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])
 def test_hostile_requests_cost_nothing(board, inputs, hostile, micropython):

@@ -133,6 +133,7 @@ def assert_same(decided, again):
         assert one == other, f"tick {tick}"
 
 
+@pytest.mark.medium
 @pytest.mark.usefixtures("micropython")  # to be skipped or to fail where there is none
 def test_a_recorded_trace_replays_bit_for_bit(trace):
     data, given, decided = trace
@@ -242,6 +243,7 @@ def sequence(n):
     yield ask("SEQUENCE_CONTROL", (0xFFFF, sequences.RESUME)) + ask("SEQUENCE_STATE")
 
 
+@pytest.mark.medium
 @pytest.mark.usefixtures("micropython")
 @pytest.mark.parametrize("name", ["wristband7", "wristband19"])
 def test_a_sequence_is_played_the_same(name):

@@ -53,6 +53,7 @@ def test_a_flow_that_no_restrictor_of_the_board_has_is_refused(rig, share):
     assert high == trim.nominal[3] * 4 // 3
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("top", [0, 1])
 @pytest.mark.parametrize("gain", [0, 1, 2])
 @pytest.mark.parametrize("zero", [0, 1])

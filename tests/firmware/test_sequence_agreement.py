@@ -122,6 +122,7 @@ def test_the_sdks_records_are_those_of_the_protocols_page(seven):
         assert Compiled.of(sequence, info, layout).records.tolist() == encode(parts, 2, 7)
 
 
+@pytest.mark.medium
 def test_random_words_never_harm(seven):
     """Whatever passes the frame's CRC: bad records are refused, good ones are within the limits, nothing fails."""
     rng = random.Random(3)

@@ -44,6 +44,7 @@ def test_a_stream_plays_on_while_it_is_written(sequencer):
     assert sequencer.begun() == list(range(start, start + total)), "no gap"
 
 
+@pytest.mark.medium
 def test_a_stream_that_runs_dry_is_held_and_says_so(seven):
     ring = seven.rig.app.player.sequence.capacity
     seven.begin(0)

@@ -68,6 +68,7 @@ THINGS = st.one_of(
 )
 
 
+@pytest.mark.medium
 @settings(max_examples=25)
 @given(things=st.lists(THINGS, max_size=20))
 def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, things):

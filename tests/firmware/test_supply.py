@@ -159,6 +159,7 @@ def lied_to(attack, fault, value, pace, relief):
     return attacked
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("pace", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize(("fault", "value"), LIES)
 def test_a_supply_sensor_that_lies_moves_no_pressure_beyond_the_dump_limit(attack, fault, value, pace):
@@ -169,6 +170,7 @@ def test_a_supply_sensor_that_lies_moves_no_pressure_beyond_the_dump_limit(attac
     assert attacked.app.faults.log.newest > 0
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("relief", "most"), [(True, 80e3 + RELIEF_MARGIN), (False, 90e3)])
 @pytest.mark.parametrize(("fault", "value"), SUBTLE)
 def test_a_lie_that_nothing_tells_from_the_truth_is_what_the_relief_valve_is_for(attack, fault, value, relief, most):

@@ -131,6 +131,7 @@ def test_a_sequence_goes_on_across_the_end_of_device_time(counts, left):
     assert_the_same(ever, play(InProcessFirmware(BOARD, BOOT_ID, boot_ticks=before), counts, before))
 
 
+@pytest.mark.medium
 @pytest.mark.usefixtures("micropython")  # to be skipped or to fail where there is none
 @pytest.mark.parametrize("left", [0, START, 130, 300])
 def test_so_it_does_on_micropython(counts, left):

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from bubble_protocol import codec
 from bubbleskin.flash.lean import lean
 from bubbleskin.toolchain.frozen import device_files
@@ -34,6 +36,7 @@ def test_texts_and_what_nobody_asks_for_are_left_out():
     }
 
 
+@pytest.mark.medium
 def test_the_schema_stays_the_same_to_the_byte(tmp_path):
     sources = device_files("wristband19")
     slim = lean(sources)

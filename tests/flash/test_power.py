@@ -209,6 +209,7 @@ def test_a_first_installation_cut_anywhere_leaves_the_prompt_or_the_firmware(ben
     assert seen == {"prompt", "new"}
 
 
+@pytest.mark.medium
 def test_firmware_that_does_not_start_leaves_the_old_one_in_use(flashed, tmp_path):
     flashed.plug_in()
     with pytest.raises(BubbleskinError, match="ImportError"):
@@ -220,6 +221,7 @@ def test_firmware_that_does_not_start_leaves_the_old_one_in_use(flashed, tmp_pat
     flashed.assert_stored()
 
 
+@pytest.mark.medium
 def test_a_trial_is_a_trial_once(flashed, tmp_path):
     board = flashed.plug_in()
     slots.try_next(board, slots.write(board, slots.look(board), firmware("new", tmp_path), lambda *_: None))
@@ -229,6 +231,7 @@ def test_a_trial_is_a_trial_once(flashed, tmp_path):
     assert flashed.runs() == "old"
 
 
+@pytest.mark.medium
 def test_the_same_firmware_again_writes_nothing(flashed, tmp_path):
     board = flashed.plug_in()
     assert slots.write(board, slots.look(board), firmware("old", tmp_path), lambda *_: None) == "a"
@@ -236,6 +239,7 @@ def test_the_same_firmware_again_writes_nothing(flashed, tmp_path):
     assert not flashed.changes
 
 
+@pytest.mark.medium
 def test_a_full_board_is_told_from_before(flashed, tmp_path):
     flashed.plug_in()
     files = {"large.mpy": bytes(390 << 10), **firmware("new", tmp_path)}
@@ -248,6 +252,7 @@ def test_a_full_board_is_told_from_before(flashed, tmp_path):
     assert flashed.runs() == "old"
 
 
+@pytest.mark.medium
 def test_a_file_that_does_not_arrive_whole_is_never_started(flashed, tmp_path, monkeypatch):
     write = Board.write
 

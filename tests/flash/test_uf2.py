@@ -145,6 +145,7 @@ def test_what_is_damaged_or_not_for_this_chip_is_refused(data, words):
     assert str(refusal.value).startswith("it.uf2 ")
 
 
+@pytest.mark.medium
 @given(st.integers(0, 40 * uf2.BLOCK - 1), st.integers(0, 7))
 def test_no_flipped_bit_of_a_header_goes_unseen(at, bit):
     data = bytearray(ordinary(GOOD))

@@ -52,6 +52,7 @@ def test_round_trips_on_every_branch(balloon):
     assert nearest.max() < 1e-8
 
 
+@pytest.mark.medium
 def test_branches_are_all_and_only_the_solutions(balloon):
     """Against a count of sign changes on a fine grid."""
     x = np.linspace(1, 10, 400_001)
@@ -144,6 +145,7 @@ def test_scalars_in_scalars_out():
     assert balloon.stretches(20e3).shape == (1,)
 
 
+@pytest.mark.medium
 def test_plain_function_compiles():
     compiled = numba.njit(yeoh_pressure)
     figures = (39.62e3, 417.3, 60.65, 1e-3, 2.5e-3)

@@ -32,6 +32,7 @@ def test_thin_wall_from_virtual_work():
         np.testing.assert_allclose(ours(X), values, rtol=1e-12)
 
 
+@pytest.mark.medium
 def test_thick_wall_antiderivative():
     """∫ W'(λ)/(λ³ − 1) dλ term by term: W = Σ c_k (I − 3)^k gives each constant its own integral."""
     x = sp.symbols("x", positive=True)

@@ -51,6 +51,7 @@ def test_intervals_cover_the_truth(kind):
     assert covered.min() >= 0.93
 
 
+@pytest.mark.medium
 def test_intervals_are_not_just_wide():
     measured, true = one_bubble(1, heights_mm=np.linspace(5.4, 13.0, 14), repeats=3)
     low, high = fit_yeoh(measured.height, measured.pressure).interval().T
@@ -173,6 +174,7 @@ def test_a_range_too_short_for_its_noise_is_doubted():
     assert sheet.report().count("note: bubble") == 3
 
 
+@pytest.mark.medium
 def test_good_data_is_not_doubted():
     for seed in range(20):
         measured, _ = one_bubble(seed, heights_mm=np.linspace(5.4, 13.0, 12), repeats=1)

@@ -79,6 +79,7 @@ def spoiled_fits(kind, share, seeds):
     return off, told
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fifth_may_be_anything(kind):
     off, told = spoiled_fits(kind, 0.2, 10)
@@ -101,6 +102,7 @@ def test_of_two_hundred_fits(kind, share, most):
     assert share == 0.2 or sum(told) > 170, "a point that is hardly off is none to leave out"
 
 
+@pytest.mark.medium
 def test_points_near_no_curve_are_refused():
     rng = np.random.default_rng(3)
     height = np.linspace(6e-3, 13e-3, 40)

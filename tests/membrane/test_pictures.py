@@ -68,6 +68,7 @@ def test_sheet_has_a_curve_per_bubble():
     assert len(axes.containers) == 3
 
 
+@pytest.mark.medium
 def test_single_points_get_the_noise_found():
     measured, _ = simulate_sheet(1, spread=0.0, seed=4, repeats=1)
     bare = type(measured)(measured.height, measured.pressure, measured.bubble)
@@ -87,6 +88,7 @@ def test_table_picture_shows_knots_and_error_within_tolerance():
     assert 0.1 < extent.y1 < 1
 
 
+@pytest.mark.medium
 def test_figures_say_that_they_are_simulated(tmp_path):
     for figure, measured in (membrane.figure_4(), membrane.figure_6()):
         assert "simulated" in figure.axes[0].get_title(loc="left")

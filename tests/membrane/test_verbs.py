@@ -42,6 +42,7 @@ def test_fit_of_one_bubble(run):
     assert found["diameter_is"] == "mid"
 
 
+@pytest.mark.medium
 def test_fit_of_a_sheet_makes_a_calibration_and_a_picture(run):
     out, _ = run("fit", SHEET, "-o", "a.toml", "--board", "mine", "--picture", "a.png")
     assert out.count("±") >= 21
@@ -62,6 +63,7 @@ def test_table_of_a_preset_of_constants_and_of_data(run):
     assert "fit of sheet.csv" in run("table", "--data", SHEET)[0]
 
 
+@pytest.mark.medium
 def test_tables_are_shown_and_compared(run):
     run("table", "-o", "a.toml")
     run("table", "--mu-kpa", "41", "-o", "b.toml")
@@ -74,6 +76,7 @@ def test_tables_are_shown_and_compared(run):
     assert out.count("Pa apart") == 7
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -90,6 +93,7 @@ def test_pictures(run, arguments):
     assert Path("picture.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.medium
 def test_picture_of_a_table(run):
     run("table", "-o", "a.toml")
     run("plot", "table", "a.toml", "--bubble", "6")

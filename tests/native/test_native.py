@@ -48,10 +48,12 @@ def test_it_is_compiled_once(loaded, cache):
     assert len(list(cache.iterdir())) == 1
 
 
+@pytest.mark.medium
 def test_another_source_is_compiled_anew(loaded):
     assert [loaded(1), loaded(2), loaded(1)] == [(42, True), (44, True), (42, False)]
 
 
+@pytest.mark.medium
 def test_half_a_file_is_compiled_anew(loaded, cache):
     loaded()
     (path,) = cache.iterdir()
@@ -59,6 +61,7 @@ def test_half_a_file_is_compiled_anew(loaded, cache):
     assert [loaded(), loaded()] == [(42, True), (42, False)]
 
 
+@pytest.mark.medium
 def test_where_nothing_can_be_kept_every_start_compiles_and_says_so(loaded, cache, capsys):
     cache.parent.write_text("a file where a folder should be")
     assert [loaded(), loaded()] == [(42, True), (42, True)]
@@ -169,6 +172,7 @@ def test_mistakes_are_exceptions(functions):
         functions["quotient"](1 << 64, 2)
 
 
+@pytest.mark.medium
 def test_what_allocates_is_refused():
     def make():
         import numba

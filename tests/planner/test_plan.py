@@ -43,6 +43,7 @@ def reachable(model, rng, highest=13e-3):
     return model.settle(steps_of(order, pressure, np.zeros(n))).height_mm
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("rings", [1, 2])
 def test_shapes_that_can_be_had_are_had(rings):
     model = bs.CompliantContact(bs.Layout.hexagon(rings))
@@ -93,6 +94,7 @@ def test_bubbles_that_do_not_touch_go_together_uncorrected(model):
     assert "No two bubbles touch" in plan.explain()
 
 
+@pytest.mark.medium
 def test_from_one_shape_to_another(model, up, down):
     """At equal pressures: nothing but a way through other pressures leads from one to the other."""
     for start, end in ((up, down), (down, up)):
@@ -107,6 +109,7 @@ def test_from_one_shape_to_another(model, up, down):
     np.testing.assert_allclose(flat.predicted_mm, 5, atol=1e-3)
 
 
+@pytest.mark.medium
 def test_what_cannot_be_had_is_named_with_the_nearest(model):
     plan = bs.plan([18, 5, 5, 5, 5, 5, 5], LAYOUT, contact=model)
     assert plan.unreachable == (0,)
@@ -116,6 +119,7 @@ def test_what_cannot_be_had_is_named_with_the_nearest(model):
     )
 
 
+@pytest.mark.medium
 def test_an_even_crowd_buckles(model):
     """13 mm everywhere is no equilibrium at this pitch, in no order."""
     plan = bs.plan(np.full(7, 13.0), LAYOUT, contact=model)

@@ -46,10 +46,12 @@ def film(tmp_path_factory):
     return pictures(path)
 
 
+@pytest.mark.medium
 def test_a_film_plays_at_the_pace_at_which_it_was_watched(film):
     assert film[1] == [70, 70, 70]
 
 
+@pytest.mark.medium
 def test_a_frame_is_the_same_whatever_was_drawn_before_it(film, tmp_path):
     high, low, again = (one[TITLE:] for one in film[0])
     path = animate(LAYOUT, [frame(0, LOW), frame(0.07, HIGH)], tmp_path / "film.gif")
@@ -78,11 +80,13 @@ def test_a_film_needs_two_frames_and_an_ending(tmp_path):
         animate(LAYOUT, [frame(0, LOW), frame(1, LOW)], tmp_path / "film.avi")
 
 
+@pytest.mark.medium
 def test_a_film_that_cannot_be_written_is_one_sentence(tmp_path):
     with pytest.raises(InvalidInput, match=r"The film .* cannot be written: No such file or directory"):
         animate(LAYOUT, [frame(0, LOW), frame(1, LOW)], tmp_path / "nowhere" / "film.gif")
 
 
+@pytest.mark.medium
 def test_the_command_films_a_sequence(tmp_path, capsys):
     path = tmp_path / "pulse.gif"
     with pytest.raises(SystemExit) as end:

@@ -231,6 +231,7 @@ def test_a_firmware_without_the_rule_is_seen(name, world):
         course(world, spoil)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("name", CONTROLS)
 def test_with_the_rule_the_same_is_kept(name, world):
     _, _, course = CONTROLS[name]

@@ -14,6 +14,7 @@ SHARES = 8
 FEW = 5
 
 
+@pytest.mark.medium
 def test_promises_are_kept(look):
     look(FEW)
 
@@ -28,6 +29,7 @@ def test_promises_are_kept_for_long(share, look):
 OVERFILLED = 128
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])
 @pytest.mark.parametrize("ramp_ms", [0, 500])
 @pytest.mark.parametrize("after_s", [0.02, 0.34, 0.5])
@@ -60,6 +62,7 @@ def test_a_reservoir_that_fills_meanwhile_takes_no_bubble_too_high(board, world)
     assert world.board.plant.height_mm[0] > 13.8
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("lie", [("supply_flat", 50e3), ("supply_flat", 55e3), ("supply_bias", -8e3)])
 def test_a_reservoir_whose_sensor_lies_takes_no_bubble_beyond_what_is_said(lie, world):
     """Air is metered from what it says. docs/safety.md has the most that is printed here (`pytest -s -k lies`)."""

@@ -52,6 +52,7 @@ def word(value):
     return value - (value >> 31 << 32) if value > 0 else value
 
 
+@pytest.mark.medium
 @every_message
 @settings(max_examples=settings.default.max_examples // 5)  # of every message
 @given(data=st.data())

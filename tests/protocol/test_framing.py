@@ -90,6 +90,7 @@ def test_a_message_comes_back(message, kind):
     assert (decoder.good, decoder.bad) == (1, 0)
 
 
+@pytest.mark.medium
 @given(st.lists(messages, max_size=5), st.data())
 def test_frames_come_back_however_the_stream_is_cut(sent, data):
     stream = b"".join(frame_of(*message) for message in sent)
@@ -108,6 +109,7 @@ def test_a_stream_may_come_byte_by_byte():
     assert [message for byte in stream for message in take(decoder, bytes([byte]))] == sent
 
 
+@pytest.mark.medium
 @given(st.lists(st.one_of(messages, st.binary(max_size=600)), max_size=6))
 def test_what_is_not_a_frame_is_left_out_and_the_next_frame_understood(parts):
     """Garbage of any length ends at the next delimiter, as a host's first write does."""
@@ -118,6 +120,7 @@ def test_what_is_not_a_frame_is_left_out_and_the_next_frame_understood(parts):
     assert decoder.good == len(sent)
 
 
+@pytest.mark.medium
 @given(st.binary(min_size=248, max_size=1000))
 def test_a_frame_longer_than_allowed_is_dropped_however_right_it_is(payload):
     content = b"\x01\x02\x03" + payload

@@ -9,6 +9,7 @@ import pytest
 import bubbleskin as bs
 
 
+@pytest.mark.medium
 def test_dir_lists_the_public_names_and_nothing_else():
     assert dir(bs) == sorted(bs.__all__)
     assert not [name for name in dir(bs) if name.startswith("_")]
@@ -51,6 +52,7 @@ def test_help_does_not_wait_for_the_physics():
     assert imported("from scipy import optimize") == ["scipy"]
 
 
+@pytest.mark.medium
 def test_python_m_bubbleskin_is_the_command():
     command = [sys.executable, "-m", "bubbleskin", "--help"]
     assert "Usage: bubbleskin" in subprocess.run(command, capture_output=True, text=True, check=True).stdout

@@ -148,6 +148,7 @@ def pairs():
     return [*((one, None) for one in JUNK), *zip(JUNK, JUNK[7:] + JUNK[:7], strict=True)]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_refused_call_is_a_sentence_and_the_next_one_goes_on(skin, verb, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -159,6 +160,7 @@ def test_a_refused_call_is_a_sentence_and_the_next_one_goes_on(skin, verb, tmp_p
         assert skin.state().mode, "whatever it was, the next call is answered"
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("call", OTHERS)
 def test_whatever_is_given_is_taken_or_refused_in_a_sentence(call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -33,6 +33,7 @@ def url(request):
     return "sim://wristband7" + ("?realtime=1" if request.param == "realtime" else "")
 
 
+@pytest.mark.medium
 def test_a_script_in_asyncio(url):
     async def script():
         async with await bs.aconnect(url) as skin:
@@ -55,6 +56,7 @@ def test_a_script_in_asyncio(url):
     run(script())
 
 
+@pytest.mark.medium
 def test_telemetry_and_show_side_by_side(url):
     async def script():
         seen = []
@@ -89,6 +91,7 @@ def test_many_requests_at_once_have_their_own_answers(url):
     run(script())
 
 
+@pytest.mark.medium
 def test_a_short_wait_does_not_last_as_long_as_another(url):
     async def script():
         async with await bs.aconnect(url) as skin:
@@ -104,6 +107,7 @@ def test_a_short_wait_does_not_last_as_long_as_another(url):
     run(script())
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("patience", [0.0, 0.001, 0.01, 0.03, 0.1])
 def test_a_cancelled_call_leaves_the_link_usable(url, patience):
     async def script():
@@ -122,6 +126,7 @@ def test_a_cancelled_call_leaves_the_link_usable(url, patience):
     run(script())
 
 
+@pytest.mark.medium
 def test_a_cancelled_wait_loses_nothing_of_what_others_wait_for(url):
     async def script():
         times = []
@@ -158,6 +163,7 @@ def test_telemetry_left_in_the_middle_does_not_end_the_next(url):
     run(script())
 
 
+@pytest.mark.medium
 def test_other_tasks_have_their_turn(url):
     async def script():
         turns = 0

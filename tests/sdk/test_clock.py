@@ -39,6 +39,7 @@ def test_the_error_is_below_a_millisecond_and_within_what_is_stated(law, reads_e
 delays = st.floats(0, 0.5)
 
 
+@pytest.mark.medium
 @given(
     st.lists(st.tuples(st.floats(1e-3, 20.0), delays, delays), min_size=1, max_size=40),
     st.floats(-1e5, 1e5),

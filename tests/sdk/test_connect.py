@@ -189,6 +189,7 @@ def telemetry_of_something_else(data):
     return encode("PING_REPLY", 7, (1, 2, 3))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
@@ -257,6 +258,7 @@ def test_a_version_mismatch_over_a_real_port(behaving):
 # What goes wrong later.
 
 
+@pytest.mark.medium
 def test_a_device_that_stops_answering(served):
     with bs.connect(served.name, timeout=TIMEOUT) as skin:
         skin.show(np.full(7, 6.0), wait=False)
@@ -267,6 +269,7 @@ def test_a_device_that_stops_answering(served):
             skin.state()
 
 
+@pytest.mark.medium
 def test_telemetry_of_a_device_that_stops_answering(served_port):
     with bs.connect(served_port.name, timeout=TIMEOUT) as skin:
         states = skin.telemetry(50)
@@ -275,6 +278,7 @@ def test_telemetry_of_a_device_that_stops_answering(served_port):
         fails(bs.DeviceSilent, "has not answered", act=lambda: list(states), within=2 * TIMEOUT + 2)
 
 
+@pytest.mark.medium
 def test_a_plug_that_is_pulled(port, served_port, tmp_path):
     name = tmp_path / "port"  # the system gives the number of a pseudo-terminal that has gone to the next that is made
     name.symlink_to(served_port.name)
@@ -311,6 +315,7 @@ def test_a_closed_skin_says_so(served):
 # What goes right.
 
 
+@pytest.mark.medium
 def test_a_served_board_takes_shapes_in_real_time(served):
     with bs.connect(served.name) as skin:
         assert skin.simulated is None
@@ -339,6 +344,7 @@ class PortWithoutLines(serial.Serial):
     _update_dtr_state = _update_break_state = _update_rts_state
 
 
+@pytest.mark.medium
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # in pyserial
 def test_a_port_of_another_machine(served_port):
     """Through pyserial's own RFC 2217 server."""

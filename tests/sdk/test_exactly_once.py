@@ -31,6 +31,7 @@ def tool(name):
 soak = tool("soak")
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("commands", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_thousands_of_commands_over_a_line_that_fails(commands):
     result = soak.soak(commands, seed=3)
@@ -137,7 +138,7 @@ class ExactlyOnce(RuleBasedStateMachine):
         self.exactly_once()
 
 
-TestExactlyOnce = ExactlyOnce.TestCase
+TestExactlyOnce = pytest.mark.medium(ExactlyOnce.TestCase)
 TestExactlyOnce.settings = settings(max_examples=8, stateful_step_count=25, deadline=None)
 
 

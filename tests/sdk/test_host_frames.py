@@ -75,6 +75,7 @@ def streams(draw):
     return [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
 
 
+@pytest.mark.medium
 @given(streams(), KEYS)
 def test_both_ends_find_the_same_frames(pieces, key):
     finder, decoder = FrameFinder(key), Decoder(crc32_into, key)

@@ -48,6 +48,7 @@ def keepers():
     return [thread for thread in threading.enumerate() if thread.name == "bubbleskin keep-alive"]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("event_loop", [False, True])
 def test_as_virtual_time_passes(event_loop):
     from bubbleskin.async_skin import AsyncSkin
@@ -74,6 +75,7 @@ def test_as_virtual_time_passes(event_loop):
     assert not keepers(), "no thread where time is virtual"
 
 
+@pytest.mark.medium
 def test_while_a_script_thinks(served_port):
     with bs.connect(served_port.name) as skin:
         skin.show(np.full(7, 9.0), wait=False)
@@ -86,6 +88,7 @@ def test_while_a_script_thinks(served_port):
     assert heard(served_port) == before, "a skin that is closed lets go"
 
 
+@pytest.mark.medium
 def test_while_an_event_loop_does_something_else(served_port):
     async def script():
         async with await bs.aconnect(served_port.name):
@@ -96,6 +99,7 @@ def test_while_an_event_loop_does_something_else(served_port):
     asyncio.run(script())
 
 
+@pytest.mark.medium
 def test_a_skin_that_nobody_holds_is_let_go(served_port):
     skin = bs.connect(served_port.name)
     assert len(keepers()) == 1
@@ -112,6 +116,7 @@ def test_a_skin_that_nobody_holds_is_let_go(served_port):
     assert not keeper.is_alive()
 
 
+@pytest.mark.medium
 def test_every_round_trip_is_told(served_port):
     with bs.connect(served_port.name) as skin:
         told = []

@@ -38,6 +38,7 @@ def switched(change):
     return on, lambda data: change(data) if on else data
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("direction", ["change", "change_sent"])
 @pytest.mark.parametrize(("fault", "least"), [(damage(1, 0.003), 40), (damage(2, 0.03), 5), (lose(3, 0.4), 35)])
 def test_a_bad_line_costs_time_and_no_truth(tapped, direction, fault, least):
@@ -247,6 +248,7 @@ def session(skin):
     return skin.simulated.height_mm
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])
 def test_the_same_run_twice_gives_the_same_bytes(tapped, board):
     runs = []

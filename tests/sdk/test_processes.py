@@ -50,6 +50,7 @@ skin.close()
 """
 
 
+@pytest.mark.medium
 @pytest.mark.timeout(120)
 def test_a_fork_sends_nothing_and_its_parent_goes_on(served):
     done = subprocess.run([sys.executable, "-c", FORKED, served.name], capture_output=True, text=True, timeout=100)
@@ -81,6 +82,7 @@ skin.close()
 """
 
 
+@pytest.mark.medium
 @pytest.mark.timeout(60)
 def test_a_lock_that_another_thread_held_does_not_hang_the_fork(served_port, port):
     done = subprocess.run([sys.executable, "-c", HELD, port.name], capture_output=True, text=True, timeout=50)
@@ -95,6 +97,7 @@ def test_a_skin_cannot_be_sent_to_another_process():
         pickle.dumps(skin)
 
 
+@pytest.mark.medium
 def test_a_skin_that_nobody_closed_says_so(served_port, port):
     skin = bs.connect(port.name)
     assert skin.state()
@@ -109,6 +112,7 @@ def let_go():
     time.sleep(0.3)
 
 
+@pytest.mark.medium
 def test_a_closed_skin_says_nothing(served_port, port, recwarn):
     with bs.connect(port.name):
         pass
@@ -116,6 +120,7 @@ def test_a_closed_skin_says_nothing(served_port, port, recwarn):
     assert not [warning for warning in recwarn if warning.category is ResourceWarning]
 
 
+@pytest.mark.medium
 def test_a_port_that_a_fork_has_inherited_is_free_once_the_first_process_has_closed_it(served_port, port):
     script = """
 import os, sys, time, warnings

@@ -69,6 +69,7 @@ def test_a_good_file_is_read(kind, tmp_path):
     assert read(kind, good(kind, tmp_path), tmp_path) is not None
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", READERS)
 @settings(max_examples=300)
 @given(data=st.data())
@@ -104,6 +105,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", ["sequence", "layout"])
 @settings(max_examples=400)
 @given(data=st.data())
@@ -123,6 +125,7 @@ def _places(value):
             yield from _places(value[key])
 
 
+@pytest.mark.medium
 @settings(max_examples=300)
 @given(st.text(max_size=300))
 def test_any_text_is_parsed_or_refused(text):
@@ -142,6 +145,7 @@ def test_a_header_that_claims_ten_gigabytes_allocates_nothing(tmp_path):
     tracemalloc.stop()
 
 
+@pytest.mark.medium
 def test_a_file_without_end_is_not_read_for_ever(tmp_path):
     (tmp_path / "field.csv").symlink_to("/dev/zero")
     with pytest.raises(bs.InvalidInput, match="more than 64 MB"):
@@ -204,6 +208,7 @@ def test_what_could_mean_two_things_is_refused_with_what_to_write(tmp_path, text
         bs.read_csv(tmp_path / "x.csv")
 
 
+@pytest.mark.medium
 def test_numbers_are_identity_from_the_file_on(tmp_path):
     sheet = Path("docs/data/sheet.csv").read_text()
     (tmp_path / "gap.csv").write_text("\n".join(line for line in sheet.splitlines() if not line.startswith("3,")))

@@ -94,6 +94,7 @@ def soon(*steps):
     return thread
 
 
+@pytest.mark.medium
 def test_pulled_and_put_back_between_two_calls(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
         skin.show(np.full(7, 9.5), wait=False)
@@ -110,6 +111,7 @@ def patient(skin):
     skin.configure(deadman_hold=5.0, deadman_vent=5.0)
 
 
+@pytest.mark.medium
 def test_pulled_and_put_back_during_show(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
         patient(skin)
@@ -119,6 +121,7 @@ def test_pulled_and_put_back_during_show(cable):
         thread.join()
 
 
+@pytest.mark.medium
 def test_pulled_during_show_for_longer_than_the_deadman_waits(cable):
     """What moves is held, and whoever asked is told."""
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
@@ -129,6 +132,7 @@ def test_pulled_during_show_for_longer_than_the_deadman_waits(cable):
         assert [fault.name for fault in skin.fault_log()] == ["host_silent"]
 
 
+@pytest.mark.medium
 def test_pulled_and_put_back_during_telemetry_and_an_upload(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
         states = skin.telemetry(50)
@@ -144,6 +148,7 @@ def test_pulled_and_put_back_during_telemetry_and_an_upload(cable):
         assert all(read.to_bytes() == table.to_bytes() for read in skin.read_tables())
 
 
+@pytest.mark.medium
 def test_pulled_for_good_raises_in_time(cable):
     with bs.connect(cable.name, timeout=1.5) as skin:
         cable.pull()
@@ -155,6 +160,7 @@ def test_pulled_for_good_raises_in_time(cable):
         assert skin.state().mode == "idle", "and it connects again by itself"
 
 
+@pytest.mark.medium
 def test_a_restart_is_told_and_nothing_is_sent_again(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
         skin.show(np.full(7, 10.0))
@@ -169,6 +175,7 @@ def test_a_restart_is_told_and_nothing_is_sent_again(cable):
         assert state.target_mm == pytest.approx(5.0)
 
 
+@pytest.mark.medium
 def test_telemetry_goes_on_after_a_restart(cable, tmp_path):
     """Whoever calls next is told of the restart; what is recorded goes on by itself."""
     with bs.connect(cable.name, timeout=TIMEOUT) as skin, skin.record(tmp_path / "x.csv", 50) as recording:
@@ -183,6 +190,7 @@ def test_telemetry_goes_on_after_a_restart(cable, tmp_path):
         assert recording.lost < 20
 
 
+@pytest.mark.medium
 def test_another_program_takes_the_wristband(cable):
     """On a line that two can write to: the first is told so, and takes it back with its next call."""
     from bubbleskin.link.message import encode
@@ -196,6 +204,7 @@ def test_another_program_takes_the_wristband(cable):
         assert skin.state().mode == "idle"
 
 
+@pytest.mark.medium
 def test_in_asyncio(cable):
     async def script():
         async with await bs.aconnect(cable.name, timeout=TIMEOUT) as skin:

@@ -50,11 +50,13 @@ def refused(skin, sentence, name, fixed=(), repeated=()):
     assert skin.health().frames_good == good + 2, "it was sent once, and answered"
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("count", [0, 1, 6, 8, 100])
 def test_show_of_the_wrong_count(skin, count):
     refused(skin, f"refused SHOW: {count} entries for its 7 bubbles", "SHOW", (0,), [(6000,)] * count)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("bubble", [0, 6])
 @pytest.mark.parametrize("height_um", [14001, 32768, 65535])
 def test_show_above_the_limit(skin, bubble, height_um):
@@ -72,6 +74,7 @@ def test_telemetry_that_is_too_slow(skin):
     refused(skin, "period_ticks is 60001", "SUBSCRIBE", (60001,))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("fixed", "knots", "sentence"),
     [

@@ -60,6 +60,7 @@ def test_json_comes_back_as_it_was_and_is_by_the_schema(sequence):
     jsonschema.validate(json.loads(text), SCHEMA_DATA)
 
 
+@pytest.mark.medium
 @settings(max_examples=40)
 @given(sequences())
 def test_duration_is_the_sum_of_what_is_played(sequence):
@@ -187,6 +188,7 @@ def test_too_many_steps_in_repeats_are_refused():
     assert bs.Sequence([step] * 100).longest == 100
 
 
+@pytest.mark.medium
 def test_1e5_steps_are_refused():
     with pytest.raises(bs.InvalidInput, match="100000 steps; a sequence has at most 65535"):
         bs.Sequence([bs.Step([6.0], 1)] * 100000)

@@ -110,6 +110,7 @@ def test_losses_are_told(tapped):
 # Recordings.
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_a_recording_is_read_by_pandas_in_one_line(skin, tmp_path, suffix):
     path = tmp_path / f"x.{suffix}"
@@ -223,6 +224,7 @@ def test_a_killed_program_leaves_a_readable_file(tmp_path):
 # The clock.
 
 
+@pytest.mark.medium
 def test_the_clock_of_a_simulated_wristband(skin):
     skin.sleep(1.234)
     clock = skin.clock

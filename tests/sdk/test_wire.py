@@ -239,6 +239,7 @@ def test_every_error_of_the_schema_is_explained():
     assert explained == {code for code, _, _ in errors.ERRORS}
 
 
+@pytest.mark.medium
 def test_no_refusal_however_odd_is_without_a_sentence():
     rng = random.Random(1)
     for _ in range(3000):

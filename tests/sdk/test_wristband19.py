@@ -23,6 +23,7 @@ def test_it_is_what_it_says(skin):
     assert skin.layout == bs.Layout.hexagon(2)
 
 
+@pytest.mark.medium
 def test_steps_of_all_bubbles(skin):
     """Within 0.2 mm from 0.6 s on, at most 0.3 mm beyond, with all 19 drawing on one reservoir."""
     rng = np.random.default_rng(1)

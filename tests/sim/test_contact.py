@@ -24,6 +24,7 @@ def heights_after(order, url="sim://wristband7"):
         return skin.simulated.height_mm, skin.simulated.plant.pressure_pa
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("seed", [0, 3])
 def test_the_papers_three_heights_through_firmware_and_valves(seed):
     shapes = {order: heights_after(order, f"sim://wristband7?seed={seed}")[0] for order in ORDERS}
@@ -81,6 +82,7 @@ def test_snapshots_hold_the_places_too():
     assert run() == first
 
 
+@pytest.mark.medium
 def test_the_step_is_as_fine_as_its_docstring_says():
     """Filled and vented by pulses, held for half a second; nothing is flung to another place."""
 

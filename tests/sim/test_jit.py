@@ -128,6 +128,7 @@ def loaded(path):
     return {name: value for name, value in vars(module).items() if name.startswith(("program", "compiled"))}
 
 
+@pytest.mark.medium
 def test_every_viper_function_that_runs_here_is_understood():
     """What numba makes of it is another matter: simulated boards run that in most tests."""
     install.enable()
@@ -184,6 +185,7 @@ def test_compiled_plain_and_checked_are_the_same(tmp_path):
     assert ways[3][2].count("plain Python") == 1
 
 
+@pytest.mark.medium
 def test_a_switch_that_is_none_is_a_sentence():
     status, _, error = run(BUBBLESKIN_JIT="yes")
     assert status == 1

@@ -94,6 +94,7 @@ def relaxed(pressure, seconds, viscosity=300.0):
     return solve_ivp(rate, (0, seconds[-1]), [1.0, 0.0, 0.0], "LSODA", seconds, rtol=1e-10, atol=1e-12).y
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kpa", [15.0, 26.0])
 def test_a_held_pressure_is_crept_under_as_another_integrator_says(kpa):
     plant = make(tube_volume=1.0, mullins=0.0, node_volume=1.0, substep=5e-6)
@@ -201,6 +202,7 @@ def total_air(plant):
     return plant.reservoir_air + plant.air.sum() + plant.vented - plant.pumped
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("spread", [0.0, 0.2])
 def test_mass_is_neither_made_nor_lost(spread):
     figures = replace(PlantParameters.nominal(7), rubber="real", supply=Supply(temperature=313.15, atmosphere=84e3))

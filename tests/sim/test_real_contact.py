@@ -22,6 +22,7 @@ def make(**figures):
     return Plant(parameters, supply_pa=26.69e3, contact=bs.CompliantContact(LAYOUT))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("order", "centre"), [("alone", 12.0), ("centre first", 13.9), ("ring first", 11.76)])
 def test_pushed_bubbles_rest_where_the_least_energy_is(order, centre):
     """The planner's model follows equilibria, at the pressures that the plant has."""
@@ -47,6 +48,7 @@ def test_springs_are_each_bubbles_own():
     assert other.height_mm[0] > plant.height_mm[0] + 0.1
 
 
+@pytest.mark.medium
 def test_the_step_is_fine_enough_where_bubbles_push():
     """Pulses up and down, held for half a second, nothing flung to another place."""
     traces = []

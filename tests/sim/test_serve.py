@@ -62,6 +62,7 @@ def served():
     served.stop()
 
 
+@pytest.mark.medium
 def test_a_flood_is_not_kept_nor_left_to_the_next_program(served):
     flood = served.plain()
     flood.settimeout(10.0)
@@ -83,6 +84,7 @@ def test_what_was_begun_for_one_program_is_not_ended_by_another(served):
         assert skin.info.bubbles == 7
 
 
+@pytest.mark.medium
 def test_programs_that_say_nothing_hold_nobody_up(served):
     with contextlib.ExitStack() as stack:
         for _ in range(50):
@@ -91,6 +93,7 @@ def test_programs_that_say_nothing_hold_nobody_up(served):
             assert skin.info.bubbles == 7
 
 
+@pytest.mark.medium
 def test_one_that_has_fallen_silent_gives_way_and_is_told(served):
     with served.plain() as silent:
         silent.sendall(b"\1")
@@ -104,6 +107,7 @@ def test_one_that_has_fallen_silent_gives_way_and_is_told(served):
         assert b"has gone to another program" in said
 
 
+@pytest.mark.medium
 def test_while_a_program_has_the_board_others_are_told(served):
     with bs.connect(served.name) as skin:
         for _ in range(3):
@@ -114,11 +118,13 @@ def test_while_a_program_has_the_board_others_are_told(served):
         assert other.info.bubbles == 7
 
 
+@pytest.mark.medium
 def test_programs_come_and_go(served):
     for _ in range(10):
         bs.connect(served.name).close()
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("share", [0.1, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_server_that_is_attacked_keeps_its_memory_and_serves_the_next(share):
     """In full: 200 MB of flood, 50 idle programs, 100 that come and go. How soon each is served, the tool says."""

@@ -54,6 +54,7 @@ def hold(skin, heights, seconds=1.0):
     return skin.simulated.alone_mm - heights, skin.state()
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("sheet", "spread"), [("paper", 0.0), ("paper", 0.1), ("stiff25", 0.0), ("stiff50", 0.0), ("ecoflex-00-30", 0.1)]
 )
@@ -68,6 +69,7 @@ def test_heights_are_true_on_every_sheet(sheet, spread):
                 assert (np.abs(skin.simulated.alone_mm - state.height_mm) < 2 * state.sd_mm).all()
 
 
+@pytest.mark.medium
 def test_memory_is_not_taken_for_height():
     with connect("&sheet=stiff50") as skin:
         for height in (12.0, 6.0, 12.0, 6.0):
@@ -75,6 +77,7 @@ def test_memory_is_not_taken_for_height():
             assert np.abs(off).max() < 0.2
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("kpa", [80, 105])
 def test_air_of_another_pressure_is_a_setting(kpa):
     shape = np.linspace(6.0, 12.0, 7)
@@ -94,6 +97,7 @@ def test_a_leak_that_is_known_is_made_up_for():
         assert np.abs(hold(skin, shape, 10.0)[0]).max() > 0.25
 
 
+@pytest.mark.medium
 def test_who_does_not_know_says_so():
     """Nobody has measured valves and sheet, as far as the device knows: the more air is metered, the less sure."""
     with connect(flow_sd=np.full(7, 3900), curve_sd=np.full(7, 16384)) as skin:
@@ -105,6 +109,7 @@ def test_who_does_not_know_says_so():
         assert not state.settled
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("sheet", ["ecoflex-00-30", "stiff50"])
 def test_what_empties_through_a_plateau_has_no_fault(sheet):
     """There the pressure of a bubble that loses air stays, or rises."""

@@ -21,6 +21,7 @@ def run(capsys, tmp_path):
     return call
 
 
+@pytest.mark.medium
 def test_tables_saved_by_one_command_are_read_by_the_next(run):
     status, out, _ = run("store", "--json")
     assert status == 0

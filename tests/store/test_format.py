@@ -58,6 +58,7 @@ def test_nothing_stored_is_factory(kit):
     assert device.content == kit.FACTORY_CONTENT
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("good", [0, 1, None])
 def test_a_bit_lost_anywhere_is_noticed(kit, good):
     (one, a), (two, b) = some_record(kit, 10, 1), some_record(kit, 20, 2)
@@ -183,6 +184,7 @@ def test_what_is_saved_already_is_not_written_again(kit):
     assert sum(flash.erases) == 2
 
 
+@pytest.mark.medium
 def test_wear_is_what_the_chip_counts(kit):
     flash = NorFlash()
     for number in range(1, 200):

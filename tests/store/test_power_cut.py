@@ -140,6 +140,7 @@ def reset(device):
 MORE = [(3, 1), (2, 65534), (2, 65535)]
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("saves", "generation"),
     [(0, 1), (1, 1), (2, 1), (3, 65534), *(pytest.param(*history, marks=pytest.mark.slow) for history in MORE)],
@@ -151,6 +152,7 @@ def test_a_save_cut_short_leaves_old_or_new(kit, saves, generation):
     assert count["new"] >= 1, "a cut after the last bit of the header"
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("saves", [1, 2])
 def test_a_reset_cut_short_leaves_old_or_factory(kit, saves):
     data = kit.board(bubbles=1)
