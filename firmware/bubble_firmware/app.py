@@ -142,7 +142,7 @@ class App:
             self.commands.finish(self.player.tick())
 
         # How long does each valve open? Estimates and pulses of all bubbles.
-        bubbles.step(counts, supply.now_pa, safety.control_mode)
+        bubbles.step(counts, supply.metering_pa, safety.control_mode)
         self.fault_monitor.block_backflow(supply.pressure_pa)
 
         # Is any of it wrong? A bubble with a fault is vented, whatever was decided.

@@ -22,8 +22,7 @@ PRESSURE_MARGIN_PA = 1_500.0
 HEIGHT_LIMIT_MM = 14.0
 HEIGHT_MARGIN_MM = 0.4
 STUCK_LIMIT_MM, STUCK_FOR_S = 15.6, 1.6
-"""Of a bubble whose fill valve sticks open as it gets there, or whose air is metered by a reservoir's sensor that lies in a way
-that no one sees at once, and for how long it may be above the limit at a stretch."""
+"""Of a bubble whose fill valve sticks open as it gets there, and for how long it may be above the limit at a stretch."""
 RESERVOIR_LIMIT_PA = 76_000.0
 """Where the dump valve opens, and a kilopascal."""
 RELIEF_LIMIT_PA = 81_000.0
@@ -204,7 +203,7 @@ class World:
         most = HEIGHT_LIMIT_MM + HEIGHT_MARGIN_MM
         self.high_s = self.high_s + self.board.tick_s if height_mm.max() > most else 0.0
         self.require(
-            height_mm.max() <= (STUCK_LIMIT_MM if self.fill_sticks or self.supply_lies else most),
+            height_mm.max() <= (STUCK_LIMIT_MM if self.fill_sticks else most),
             "height",
             f"{height_mm.max():.2f} mm in bubble {int(height_mm.argmax())}",
         )

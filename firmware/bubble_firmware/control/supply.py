@@ -8,6 +8,10 @@ The supply is *lost* where it does not help or its sensor does not tell the trut
 3. does not rise while the pump works and little air is taken, or does not fall while more is taken than the pump can bring:
    *effort* and *debt* add up until they show.
 
+Until that is found, the reservoir may *hide* pressure: what pump and valves should have made of it in the meantime, less what
+the reading has made of it, where that says that there is enough. Air is metered with the reading and what is hidden, so that a
+sensor that lies lets too little air in rather than too much.
+
 It is lost, too, where it stays below what is needed, and where the pump works at its utmost for longer than it may.
 """
 
@@ -30,8 +34,11 @@ _SHOWS_PA = const(1000)  # a change that is more than noise, which is 50
 # Effort and debt are in 1/256 of the pump's full work times 1.024 ms. An open fill valve takes 23 % of that work at 60 kPa, and
 # 9 % where the reservoir has 45 and the bubble 34 kPa.
 _EFFORT_MAX = const(100000)  # 0.4 s of full work: 20 kPa
-_EFFORT_LOST = const(64)  # a quarter of it may leak away: what the droop at rest asks for
+_EFFORT_LOST = const(64)  # a quarter of it may leak away or not come: droop at rest, a weak pump
 _EFFORT_TAKEN = const(90)  # more than a fill valve takes
+_EFFORT_PER_PA = const(5)  # at 60 kPa
+_HIDDEN_TAKEN = const(60)  # what a fill valve takes from a full reservoir
+_HIDDEN_FREE_PA = const(500)  # noise, and gas that warms and cools, make true readings seem to hide up to 400
 _DEBT_MAX = const(25000)
 _DEBT_TAKEN = const(18)  # less than a fill valve takes from a reservoir that has what is needed
 
@@ -52,19 +59,22 @@ _DEBT = const(12)  # air that has been taken and does not show
 _TOP = const(13)  # greatest pressure since that began, Pa
 _WORKING = const(14)  # ticks in a row at full duty
 _NOW = const(15)  # last reading that is no leap, Pa
+_HIDDEN = const(16)  # what the reservoir may have more than that, as effort
+_UNSEEN = const(17)  # what the next reading should have more, and some, as effort
+_METERING = const(18)  # what to meter air with, Pa
 # The board's numbers.
-_TICK_US = const(16)
-_COUNT_LOW = const(17)
-_COUNT_HIGH = const(18)
-_ZERO = const(19)
-_PA_PER_COUNT = const(20)
-_NOMINAL = const(21)
-_MAX = const(22)
-_NEEDED = const(23)
-_FROZEN_MAX = const(24)  # ticks
-_WORKING_MAX = const(25)
-_PATIENCE = const(26)
-_DIP = const(27)
+_TICK_US = const(19)
+_COUNT_LOW = const(20)
+_COUNT_HIGH = const(21)
+_ZERO = const(22)
+_PA_PER_COUNT = const(23)
+_NOMINAL = const(24)
+_MAX = const(25)
+_NEEDED = const(26)
+_FROZEN_MAX = const(27)  # ticks
+_WORKING_MAX = const(28)
+_PATIENCE = const(29)
+_DIP = const(30)
 
 
 @micropython.viper
@@ -94,7 +104,9 @@ def _read(s: ptr32, count: int) -> int:
         if s[_BEGUN] == 0:
             s[_BEGUN] = 1
             s[_PRESSURE] = pressure
+            s[_NOW] = pressure
         s[_PRESSURE] = s[_PRESSURE] + (pressure - s[_PRESSURE] >> 2)  # four readings average the noise away
+        s[_HIDDEN] = s[_HIDDEN] - _EFFORT_PER_PA * (pressure - s[_NOW])
         s[_NOW] = pressure
     return lost
 
@@ -119,6 +131,13 @@ def _balance(s: ptr32, pulses: ptr16, end: int) -> int:
         effort = 0  # after a CLEAR it begins anew
         lost = 1
     s[_EFFORT] = effort
+    hidden = s[_HIDDEN] + s[_UNSEEN]
+    s[_UNSEEN] = work - _EFFORT_LOST * s[_TICK_US] - taken * _HIDDEN_TAKEN >> 10
+    if hidden < 0 or pressure < s[_NEEDED] or s[_DUMP]:
+        hidden = 0
+    s[_HIDDEN] = hidden
+    hidden = hidden // _EFFORT_PER_PA - _HIDDEN_FREE_PA
+    s[_METERING] = s[_NOW] + (hidden if hidden > 0 else 0)
     debt = s[_DEBT] + (taken * _DEBT_TAKEN - work >> 10)
     if debt <= 0 or pressure < s[_TOP] - _SHOWS_PA or pressure < s[_NEEDED] or s[_DUMP]:
         debt = 0
@@ -161,12 +180,13 @@ def _decide(s: ptr32, lost: int, shut: int) -> int:
 class Supply:
     """`pressure_pa` is measured, `pump` (0 to 65535) and `dump` are what to do about it; `lost`: it does not help.
 
-    `now_pa` has noise and no lag: nineteen bubbles that rise take 2 kPa in a tick, which flow and so metered air would miss.
+    `metering_pa` is what air is metered with, the reading and what may be hidden. It has noise and no lag: nineteen bubbles that
+    rise take 2 kPa in a tick, which flow and so metered air would miss.
     """
 
     def __init__(self, board: "ModuleType"):
         self.pressure_pa = 0
-        self.now_pa = 0
+        self.metering_pa = 0
         self.pump = 0
         self.dump = 0
         self.lost = 0
@@ -196,6 +216,6 @@ class Supply:
         lost = _read(state, count) | _balance(state, pulses, len(pulses))
         self.lost = _decide(state, lost, shut)
         self.pressure_pa = state[_PRESSURE]
-        self.now_pa = state[_NOW]
+        self.metering_pa = state[_METERING]
         self.pump = state[_PUMP]
         self.dump = state[_DUMP]

@@ -173,7 +173,7 @@ class _FirstFirmware(Firmware):
         """See `Firmware`."""
         supply = self._supply
         supply.sense(counts[-1], self._pulses, 0)
-        self.law.step(counts, supply.now_pa, self.mode)
+        self.law.step(counts, supply.metering_pa, self.mode)
         self._pulses = array("H", self.law.pulses())
         return Outputs(self._pulses, supply.pump, bool(supply.dump), b"")
 
