@@ -2,6 +2,7 @@
 
 TYPE_CHECKING = False  # as of `typing`, which is not waited for
 if TYPE_CHECKING:
+    from bubbleskin import patterns as patterns
     from bubbleskin.async_skin import AsyncSkin
     from bubbleskin.calibrate.measure import CalibrationProgress
     from bubbleskin.calibrate.result import BubbleCalibration, SelfCalibration
@@ -106,7 +107,7 @@ _ROOMS = {
     "preset": "membrane",
     "read_csv": "membrane",
 }
-_MODULES = {"sequences": "sequence.library", "shapes": "shape.shapes"}
+_MODULES = {"patterns": "patterns", "sequences": "sequence.library", "shapes": "shape.shapes"}
 
 __all__ = [
     "After",
@@ -157,6 +158,7 @@ __all__ = [
     "fit_contact",
     "fit_sheet",
     "fit_yeoh",
+    "patterns",
     "plan",
     "preset",
     "read_csv",
