@@ -17,6 +17,30 @@ itself, because the firmware cannot see that a neighbour lifts a bubble."""
 EMULATED_SLOWNESS = 10
 """Times as long as on a real board, at most: guards against hangs are longer by this on an emulated chip."""
 FLAT_KPA = 0.4  # sensor noise is 50 Pa
+ORDER = (
+    "test_first_moves",
+    "test_line",
+    "test_link",
+    "test_limits",
+    "test_vent_stop",
+    "test_steps",
+    "test_sequences",
+    "test_store",
+)
+"""What a board goes through: one bubble before all, low before high, ways to stop before ways to move; the rest comes last."""
+MARKS = {
+    "slow": "takes seconds",
+    "medium": "takes half a second and more",
+    "long": "takes long in the chip's own time: left out on an emulated chip",
+}
+
+_SKIN = pytest.StashKey[bs.Skin]()
+
+
+def pytest_configure(config):
+    """From a wheel there is no pyproject.toml that tells them."""
+    for mark, meaning in MARKS.items():
+        config.addinivalue_line("markers", f"{mark}: {meaning}")
 
 
 def pytest_addoption(parser):
@@ -36,20 +60,55 @@ def pytest_generate_tests(metafunc):
 
 
 def pytest_collection_modifyitems(config, items):
-    """An emulated chip takes 20 times longer than a real one: there, tests marked `long` are left out, hangs found later."""
+    """In an order that is kind to a board; on an emulated chip without what is `long`.
 
-    def is_emulated(item):
-        target = item.callspec.params.get("target", "") if hasattr(item, "callspec") else ""
-        return target.startswith("rp2040:")
-
-    left_out = [item for item in items if is_emulated(item) and item.get_closest_marker("long")]
-    for item in items:
-        guard = item.get_closest_marker("timeout")
-        if guard and is_emulated(item):
+    An emulated chip takes 20 times longer than a real one: there, hangs are found later, too.
+    """
+    ours = [item for item in items if "target" in getattr(item, "fixturenames", ())]
+    places = [place for place, item in enumerate(items) if "target" in getattr(item, "fixturenames", ())]
+    for place, item in zip(places, sorted(ours, key=_turn), strict=True):
+        items[place] = item
+    emulated = [item for item in ours if _target(item).startswith("rp2040:")]
+    left_out = [item for item in emulated if item.get_closest_marker("long")]
+    for item in emulated:
+        if guard := item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(EMULATED_SLOWNESS * guard.args[0]), append=False)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
+
+
+def _target(item) -> str:
+    return item.callspec.params.get("target", "") if hasattr(item, "callspec") else ""
+
+
+def _turn(item) -> tuple[str, int]:
+    name = item.path.stem
+    return _target(item), ORDER.index(name) if name in ORDER else len(ORDER)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item):
+    """What the wristband says of a failure stands beside it; and a board that fails its first moves goes no further."""
+    report = yield
+    if report.when == "call" and report.failed:
+        if skin := item.stash.get(_SKIN, None):
+            report.sections.append(("What the wristband says", _said(skin)))
+        if item.path.stem == ORDER[0] and "://" not in _target(item):
+            item.session.shouldfail = "A first move has failed, so this board is not asked for more. Mend that first."
+    return report
+
+
+def _said(skin: bs.Skin) -> str:
+    """State, faults, causes and remedies, as far as there is an answer."""
+    lines = []
+    for ask in (skin.health, skin.state, skin.fault_log):
+        try:
+            said = ask()
+        except bs.BubbleskinError as error:
+            said = str(error)
+        lines += [str(each) for each in said] if isinstance(said, list) else [str(said)]
+    return "\n".join(lines)
 
 
 def connect(target: str) -> bs.Skin:
@@ -64,9 +123,10 @@ def connect(target: str) -> bs.Skin:
 
 
 @pytest.fixture
-def skin(target: str) -> Iterator[bs.Skin]:
+def skin(target: str, request: pytest.FixtureRequest) -> Iterator[bs.Skin]:
     """A fresh connection to a flat wristband, which is vented in the end."""
     with connect(target) as skin:
+        request.node.stash[_SKIN] = skin
         skin.vent()
         for _ in range(40):
             if np.abs(skin.state().pressure_kpa).max() < FLAT_KPA:

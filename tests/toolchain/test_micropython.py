@@ -204,6 +204,15 @@ def test_a_wheel_runs_the_micropython_that_was_built_before(wheel):
 
 
 @pytest.mark.slow
+def test_a_wheel_has_the_suite_of_every_target(wheel):
+    command = [sys.executable, "-m", "bubbleskin", "hil", "--list", "--only", "silent"]
+    environment = {**os.environ, "PYTHONPATH": str(wheel)}
+    done = subprocess.run(command, env=environment, cwd=wheel, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "test_a_shape_is_vented_when_the_host_stays_silent" in done.stdout
+
+
+@pytest.mark.slow
 def test_a_wheel_that_cannot_build_micropython_says_what_to_do(wheel, tmp_path):
     done = shows_from_wheel(wheel, tmp_path, "/nowhere")
     assert done.returncode == 1

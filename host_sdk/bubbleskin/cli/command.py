@@ -17,6 +17,7 @@ from bubbleskin.cli import (
     doctor,
     firmware,
     flash,
+    hil,
     membrane,
     monitor,
     plan,
@@ -53,6 +54,7 @@ for _command in (
     *bench.commands,
     *firmware.commands,
     *flash.commands,
+    *hil.commands,
 ):
     bubbleskin.add_command(_command)
 

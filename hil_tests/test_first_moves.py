@@ -1,0 +1,58 @@
+"""The first moves of a board that nobody has seen move: self-test, one bubble low, each by itself, all of them, and high."""
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.timeout(60)
+
+LOW_MM = 6.5  # some 18 kPa: little air, and a bubble that is seen to rise
+
+
+def test_the_self_test_has_found_nothing(skin):
+    for _ in range(50):
+        if skin.health().self_test not in ("running", "not_run"):
+            break
+        skin.sleep(0.1)
+    health = skin.health()
+    usual = {"passed", "not_run"} if skin.simulated else {"passed"}  # simulated boards begin after it
+    assert health.self_test in usual
+    assert health.untrue_zero == health.unfilled == health.unvented == ()
+    assert health.board_faults == ()
+
+
+def test_the_first_bubble_rises_a_little_and_comes_back(skin):
+    _alone(skin, 0)
+
+
+@pytest.mark.long
+def test_each_bubble_moves_when_it_is_asked_and_no_other(skin):
+    """Swapped tubes and wires show here: the pressure rises elsewhere."""
+    for bubble in range(skin.info.bubbles):
+        _alone(skin, bubble)
+
+
+def _alone(skin, bubble):
+    heights = np.zeros(skin.info.bubbles)
+    heights[bubble] = LOW_MM
+    skin.show(heights)
+    pressure = skin.state().pressure_kpa
+    others = np.arange(skin.info.bubbles) != bubble
+    assert pressure[bubble] > 5, f"bubble {bubble} was asked to rise: is its tube where its valves are?"
+    assert np.abs(pressure[others]).max() < 2, f"only bubble {bubble} was asked to rise"
+    skin.vent()
+    skin.sleep(0.8)
+    assert np.abs(skin.state().pressure_kpa).max() < 1, "vented"
+
+
+def test_all_rise_low(skin):
+    skin.show(np.full(skin.info.bubbles, LOW_MM))
+    assert (skin.state().pressure_kpa > 5).all()
+    assert skin.faults() == {}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("height_mm", [9.0, 12.0])
+def test_all_rise_high(skin, height_mm):
+    skin.show(np.full(skin.info.bubbles, height_mm))
+    assert skin.faults() == {}
+    skin.vent()

@@ -1,0 +1,139 @@
+"""A line that garbles, repeats and loses: each request is applied once, as it was asked, or not at all."""
+
+import numpy as np
+import pytest
+
+import bubbleskin as bs
+
+pytestmark = pytest.mark.timeout(60)
+
+
+@pytest.fixture
+def line(skin, monkeypatch):
+    """The line to the wristband, which does to the bytes of the next write what a test wants."""
+    return Line(skin, monkeypatch)
+
+
+class Line:
+    """`line.spoil = f`: the next write sends f(data) instead of data. `line.sent`: the last write, as it was meant."""
+
+    def __init__(self, skin, monkeypatch):
+        transport = skin.link.transport
+        self.send = transport.write
+        self.spoil = None
+        self.sent = b""
+        monkeypatch.setattr(transport, "write", self._write)
+
+    def _write(self, data):
+        self.sent, spoil = bytes(data), self.spoil
+        self.spoil = None
+        data = spoil(bytes(data)) if spoil else data
+        if data:
+            self.send(data)
+
+
+def flipped(place, bit=1):
+    """`data` with one bit of the byte at `place` turned over, a share of its length; no byte becomes a frame's end."""
+
+    def spoil(data):
+        at = round(place * (len(data) - 3)) + 1
+        spoiled = data[at] ^ 1 << bit
+        return data[:at] + bytes([spoiled or 3]) + data[at + 1 :]
+
+    return spoil
+
+
+@pytest.mark.parametrize("place", [0.3, 0.5, 0.8])
+def test_a_garbled_show_is_not_applied_but_sent_again(skin, line, place):
+    n = skin.info.bubbles
+    bad = skin.health().frames_bad
+    line.spoil = flipped(place)
+    skin.show(np.full(n, 6.5), wait=False)
+    assert skin.state().target_mm == pytest.approx(6.5)
+    assert skin.health().frames_bad == bad + 1
+
+
+def test_a_show_that_is_lost_is_sent_again(skin, line):
+    n = skin.info.bubbles
+    line.spoil = lambda data: b""
+    skin.show(np.full(n, 6.5), wait=False)
+    assert skin.state().target_mm == pytest.approx(6.5)
+
+
+def test_a_show_that_comes_again_later_is_not_applied_again(skin, line):
+    n = skin.info.bubbles
+    skin.show(np.full(n, 6.0), wait=False)
+    old = line.sent
+    skin.show(np.full(n, 7.5), wait=False)
+    line.send(old)
+    skin.sleep(0.1)
+    assert skin.state().target_mm == pytest.approx(7.5)
+
+
+def test_a_vent_that_comes_again_later_does_not_end_a_show(skin, line):
+    n = skin.info.bubbles
+    skin.vent()
+    old = line.sent
+    skin.show(np.full(n, 6.0), wait=False)
+    line.send(old)
+    skin.sleep(0.1)
+    assert skin.state().mode == "active"
+
+
+def test_what_is_no_frame_is_left_out(skin, line):
+    n = skin.info.bubbles
+    noise = np.random.default_rng(1).integers(0, 256, 400, np.uint8).tobytes()
+    line.spoil = lambda data: noise + b"\0" + data
+    skin.show(np.full(n, 6.5), wait=False)
+    assert skin.state().target_mm == pytest.approx(6.5)
+    assert skin.state().mode == "active"
+
+
+def test_requests_of_another_session_are_not_heard(target, skin, line):
+    """A frame kept from before a new greeting belongs to nobody."""
+    n = skin.info.bubbles
+    skin.show(np.full(n, 6.0), wait=False)
+    old = line.sent
+    at_once(skin.link.hello())
+    skin.vent()
+    line.send(old)
+    skin.sleep(0.1)
+    assert skin.state().mode in ("venting", "idle")
+
+
+def at_once(coroutine):
+    """The result of a coroutine of a link without an event loop: it never waits for anyone."""
+    try:
+        coroutine.send(None)
+    except StopIteration as end:
+        return end.value
+    raise AssertionError("it waits for an event loop")
+
+
+def raw_show(skin, micrometres, over_ms=0):
+    """SHOW as the host would never send it."""
+    at_once(skin.link.call("SHOW", (over_ms,), [(height,) for height in micrometres]))
+
+
+@pytest.mark.parametrize("bubble", [0, -1])
+def test_the_wristband_refuses_what_is_too_high_for_one_bubble_whichever(skin, bubble):
+    skin.show(np.full(skin.info.bubbles, 6.0))
+    heights = np.full(skin.info.bubbles, 6000)
+    heights[bubble] = round(skin.info.height_max_mm * 1000) + 1
+    with pytest.raises(bs.DeviceRefused):
+        raw_show(skin, heights.tolist())
+    state = skin.state()
+    assert state.target_mm == pytest.approx(6.0)
+    assert state.mode == "active"
+
+
+@pytest.mark.parametrize("by", [-1, 1])
+def test_the_wristband_refuses_heights_for_another_number_of_bubbles(skin, by):
+    with pytest.raises(bs.BubbleskinError):
+        raw_show(skin, [6000] * (skin.info.bubbles + by))
+    assert skin.state().mode in ("venting", "idle")
+
+
+def test_a_show_at_its_limits_is_taken(skin):
+    raw_show(skin, [round(skin.info.height_max_mm * 1000)] * skin.info.bubbles, over_ms=60000)
+    assert skin.state().mode == "active"
