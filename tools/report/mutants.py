@@ -92,11 +92,9 @@ def main() -> int:
             mutant.name, suite or "nothing", test if suite == "hil_tests" else f"{mutant.outside or '–'} {test}"
         )
     console.print(table)
-    visible = [mutant for mutant in wanted if not mutant.outside]
+    visible = sum(not mutant.outside for mutant in wanted)
     console.print(
-        f"{len(wanted)} mutants, {len(visible)} of them to be seen from outside: {counts['hil_tests']} found by hil_tests,"
-    )
-    console.print(
+        f"{len(wanted)} mutants, {visible} of them to be seen from outside: {counts['hil_tests']} found by hil_tests, "
         f"{counts['tests']} more by the tests of firmware, protocol, promises and store, {counts['']} by nothing."
     )
     return 1 if counts[""] else 0
