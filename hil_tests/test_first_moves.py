@@ -44,6 +44,7 @@ def _alone(skin, bubble):
     assert np.abs(skin.state().pressure_kpa).max() < 1, "vented"
 
 
+@pytest.mark.long
 def test_all_rise_low(skin):
     skin.show(np.full(skin.info.bubbles, LOW_MM))
     assert (skin.state().pressure_kpa > 5).all()

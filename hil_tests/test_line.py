@@ -43,7 +43,9 @@ def flipped(place, bit=1):
     return spoil
 
 
-@pytest.mark.parametrize("place", [0.3, 0.5, 0.8])
+@pytest.mark.parametrize(
+    "place", [0.3, pytest.param(0.5, marks=pytest.mark.long), pytest.param(0.8, marks=pytest.mark.long)]
+)
 def test_a_garbled_show_is_not_applied_but_sent_again(skin, line, place):
     n = skin.info.bubbles
     bad = skin.health().frames_bad
@@ -53,6 +55,7 @@ def test_a_garbled_show_is_not_applied_but_sent_again(skin, line, place):
     assert skin.health().frames_bad == bad + 1
 
 
+@pytest.mark.long
 def test_a_show_that_is_lost_is_sent_again(skin, line):
     n = skin.info.bubbles
     line.spoil = lambda data: b""
@@ -70,6 +73,7 @@ def test_a_show_that_comes_again_later_is_not_applied_again(skin, line):
     assert skin.state().target_mm == pytest.approx(7.5)
 
 
+@pytest.mark.long
 def test_a_vent_that_comes_again_later_does_not_end_a_show(skin, line):
     n = skin.info.bubbles
     skin.vent()
@@ -80,6 +84,7 @@ def test_a_vent_that_comes_again_later_does_not_end_a_show(skin, line):
     assert skin.state().mode == "active"
 
 
+@pytest.mark.long
 def test_what_is_no_frame_is_left_out(skin, line):
     n = skin.info.bubbles
     noise = np.random.default_rng(1).integers(0, 256, 400, np.uint8).tobytes()
@@ -89,6 +94,7 @@ def test_what_is_no_frame_is_left_out(skin, line):
     assert skin.state().mode == "active"
 
 
+@pytest.mark.long
 def test_requests_of_another_session_are_not_heard(target, skin, line):
     """A frame kept from before a new greeting belongs to nobody."""
     n = skin.info.bubbles
@@ -115,7 +121,7 @@ def raw_show(skin, micrometres, over_ms=0):
     at_once(skin.link.call("SHOW", (over_ms,), [(height,) for height in micrometres]))
 
 
-@pytest.mark.parametrize("bubble", [0, -1])
+@pytest.mark.parametrize("bubble", [pytest.param(0, marks=pytest.mark.long), -1])
 def test_the_wristband_refuses_what_is_too_high_for_one_bubble_whichever(skin, bubble):
     skin.show(np.full(skin.info.bubbles, 6.0))
     heights = np.full(skin.info.bubbles, 6000)
@@ -127,6 +133,7 @@ def test_the_wristband_refuses_what_is_too_high_for_one_bubble_whichever(skin, b
     assert state.mode == "active"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by", [-1, 1])
 def test_the_wristband_refuses_heights_for_another_number_of_bubbles(skin, by):
     with pytest.raises(bs.BubbleskinError):
@@ -134,6 +141,7 @@ def test_the_wristband_refuses_heights_for_another_number_of_bubbles(skin, by):
     assert skin.state().mode in ("venting", "idle")
 
 
+@pytest.mark.long
 def test_a_show_at_its_limits_is_taken(skin):
     raw_show(skin, [round(skin.info.height_max_mm * 1000)] * skin.info.bubbles, over_ms=60000)
     assert skin.state().mode == "active"

@@ -45,6 +45,7 @@ def failing(skin):
     skin.clear_faults()
 
 
+@pytest.mark.long
 def test_a_move_is_held_soon_after_the_host_falls_silent(skin, silence):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.0), over=20.0, wait=False)
@@ -68,6 +69,7 @@ def test_a_shape_is_vented_when_the_host_stays_silent(skin, silence):
     assert skin.state().mode == "active", "it forbids nothing"
 
 
+@pytest.mark.long
 def test_the_deadman_cannot_be_switched_off(skin):
     before = {name: setting.value for name, setting in skin.settings().items()}
     for wrong in (0.0, 1e6, float("inf")):
@@ -76,6 +78,7 @@ def test_the_deadman_cannot_be_switched_off(skin):
     assert {name: setting.value for name, setting in skin.settings().items()} == before
 
 
+@pytest.mark.long
 def test_pressure_and_time_have_a_budget(skin):
     n = skin.info.bubbles
     before = skin.settings()["budget_kpa_s"].value
@@ -107,7 +110,10 @@ FAILURES = {
 }
 
 
-@pytest.mark.parametrize("what", FAILURES)
+@pytest.mark.parametrize(
+    "what",
+    [name if name == "a sensor that is gone" else pytest.param(name, marks=pytest.mark.long) for name in FAILURES],
+)
 def test_the_ill_bubble_is_isolated_and_only_that(skin, failing, what):
     failure, value, names = FAILURES[what]
     n, ill = skin.info.bubbles, skin.info.bubbles - 1
@@ -129,6 +135,7 @@ def test_the_ill_bubble_is_isolated_and_only_that(skin, failing, what):
         assert skin.simulated.alone_mm[others] == pytest.approx(9.0, abs=0.3)
 
 
+@pytest.mark.long
 def test_a_fault_stays_until_it_is_acknowledged(skin, failing):
     n = skin.info.bubbles
     skin.show(np.full(n, 8.0))
@@ -146,6 +153,7 @@ def test_a_fault_stays_until_it_is_acknowledged(skin, failing):
     skin.show(np.full(n, 8.0))
 
 
+@pytest.mark.long
 def test_one_acknowledged_fault_leaves_the_later_ones(skin, failing):
     n = skin.info.bubbles
     skin.show(np.full(n, 8.0))
@@ -158,6 +166,7 @@ def test_one_acknowledged_fault_leaves_the_later_ones(skin, failing):
     assert list(skin.faults()) == [3]
 
 
+@pytest.mark.long
 def test_a_supply_that_is_gone_vents_and_is_named(skin, failing):
     n = skin.info.bubbles
     skin.show(np.full(n, 8.0))
