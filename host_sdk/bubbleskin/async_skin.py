@@ -28,8 +28,8 @@ from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link
 from bubbleskin.link.message import Message
 from bubbleskin.link.transport import Transport
-from bubbleskin.sequence.model import Playable
-from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
+from bubbleskin.sequence.model import Playable, refuse_chance
+from bubbleskin.sequence.playback import At, PlaybackReport, PlaybackStatus, Told
 from bubbleskin.sequence.player import Player
 from bubbleskin.shape.heightfield import Heights, sample
 from bubbleskin.telemetry.recording import Recording
@@ -199,27 +199,30 @@ class AsyncSkin:
 
     @overload
     async def play(
-        self, sequence: Playable, at: float | None = None, wait: Literal[True] = True, progress: Progress | None = None
+        self, sequence: Playable, at: At = None, wait: Literal[True] = True, progress: Told = None, anyway: bool = False
     ) -> PlaybackReport: ...
     @overload
     async def play(
-        self, sequence: Playable, at: float | None = None, *, wait: Literal[False], progress: Progress | None = None
+        self, sequence: Playable, at: At = None, *, wait: Literal[False], progress: Told = None, anyway: bool = False
     ) -> None: ...
     @overload
     async def play(
-        self, sequence: Playable, at: float | None, wait: Literal[False], progress: Progress | None = None
+        self, sequence: Playable, at: At, wait: Literal[False], progress: Told = None, anyway: bool = False
     ) -> None: ...
     @overload
     async def play(
-        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress | None = None
+        self, sequence: Playable, at: At = None, wait: bool = True, progress: Told = None, anyway: bool = False
     ) -> PlaybackReport | None: ...
     async def play(
-        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress | None = None
+        self, sequence: Playable, at: At = None, wait: bool = True, progress: Told = None, anyway: bool = False
     ) -> PlaybackReport | None:
         """See `Skin.play`."""
         checks.flag("wait", wait)
+        checks.flag("anyway", anyway)
         if progress is not None and not callable(progress):
             raise InvalidInput(f"progress is {checks.shown(progress)}; give a function of one PlaybackStatus, or None.")
+        if not anyway:
+            refuse_chance(sequence)
         try:
             started = await self._player.start(sequence, at, follow=wait)
             return await self._player.follow(started, progress) if wait else None

@@ -18,7 +18,7 @@ from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link, run_sync
 from bubbleskin.sequence.model import Playable
-from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
+from bubbleskin.sequence.playback import At, PlaybackReport, PlaybackStatus, Told
 from bubbleskin.shape.heightfield import Heights
 from bubbleskin.telemetry.recording import Recording
 
@@ -129,22 +129,22 @@ class Skin:
 
     @overload
     def play(
-        self, sequence: Playable, at: float | None = None, wait: Literal[True] = True, progress: Progress | None = None
+        self, sequence: Playable, at: At = None, wait: Literal[True] = True, progress: Told = None, anyway: bool = False
     ) -> PlaybackReport: ...
     @overload
     def play(
-        self, sequence: Playable, at: float | None = None, *, wait: Literal[False], progress: Progress | None = None
+        self, sequence: Playable, at: At = None, *, wait: Literal[False], progress: Told = None, anyway: bool = False
     ) -> None: ...
     @overload
     def play(
-        self, sequence: Playable, at: float | None, wait: Literal[False], progress: Progress | None = None
+        self, sequence: Playable, at: At, wait: Literal[False], progress: Told = None, anyway: bool = False
     ) -> None: ...
     @overload
     def play(
-        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress | None = None
+        self, sequence: Playable, at: At = None, wait: bool = True, progress: Told = None, anyway: bool = False
     ) -> PlaybackReport | None: ...
     def play(
-        self, sequence: Playable, at: float | None = None, wait: bool = True, progress: Progress | None = None
+        self, sequence: Playable, at: At = None, wait: bool = True, progress: Told = None, anyway: bool = False
     ) -> PlaybackReport | None:
         """Play a sequence by the device's own clock; it takes over from whatever the bubbles did before.
 
@@ -154,8 +154,9 @@ class Skin:
         which to begin; None is now, and a time that has passed is refused. With `wait`, follows it to its end, tells
         `progress` of every step, and returns when each began; raises `DeviceFault` where it does not come to its end:
         stopped, vented, a timeout after which it was not to go on. Without, returns None once it has been started.
+        A plan that is not sure (`Plan.sure`) is refused unless `anyway`.
         """
-        return run_sync(self._skin.play(sequence, at, wait, progress))
+        return run_sync(self._skin.play(sequence, at, wait, progress, anyway))
 
     def playing(self) -> PlaybackStatus:
         """How far the sequence is that was played last, or how it ended."""

@@ -43,6 +43,7 @@ def test_from_another_shape(capsys):
         ([], "in one way"),
         (["8", "--shape", "dome"], "in one way"),
         (["high"] * 7, "not a height"),
+        (["8"] * 7 + ["--anyway"], "goes with --play"),
     ],
 )
 def test_mistakes_are_one_line_and_status_2(capsys, arguments, words):
@@ -60,3 +61,13 @@ def test_the_picture_is_drawn(capsys, tmp_path):
     assert status == 0
     assert "wrote" in err
     assert path.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_what_is_not_sure_is_played_when_asked_twice(capsys):
+    near = ["10.92", "11.04", "10.81", "9.68", "11.92", "10.33", "9.0", "--play", "--device", "sim://wristband7"]
+    status, _, err = run(capsys, "plan", *near)
+    assert status == 2
+    assert "anyway" in err
+    status, _, err = run(capsys, "plan", *near, "--anyway")
+    assert status == 0
+    assert "played" in err

@@ -54,7 +54,7 @@ def test_rubber_that_snaps_is_held_on_its_falling_branch():
     np.testing.assert_allclose(shape.size_mm, [10.0, 9, 9, 9, 9, 9, 9], atol=0.01)
 
 
-@pytest.mark.parametrize("sizes", [[12.0] * 6, [4.0] + [9.0] * 6, [np.nan] * 7, [25.0] * 7])
+@pytest.mark.parametrize("sizes", [[12.0] * 6, [-4.0] + [9.0] * 6, [np.nan] * 7, [26.0] * 7])
 def test_sizes_that_no_bubble_has_are_refused(model, sizes):
     with pytest.raises(InvalidInput):
         model.settle_sizes(sizes)

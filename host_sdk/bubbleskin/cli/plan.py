@@ -2,7 +2,7 @@
 
 import json as jsonlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 import numpy as np
@@ -11,7 +11,8 @@ from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bubbleskin import boards
-from bubbleskin.cli.options import Board, as_json, progress
+from bubbleskin.cli.options import Board, as_json, device, gathered, progress
+from bubbleskin.connecting import connect
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.shape import shapes
@@ -23,6 +24,22 @@ if TYPE_CHECKING:
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
+class Asked(NamedTuple):
+    """The shape, said in one of three ways."""
+
+    heights: tuple[str, ...]
+    shape: str | None
+    path: Path | None
+
+
+class Playing(NamedTuple):
+    """Whether a plan is played, where, and whether it need not be sure."""
+
+    play: bool
+    device: str | None
+    anyway: bool
+
+
 @click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("heights", nargs=-1, metavar="[MM]...")
 @click.option("--shape", type=click.Choice(list(shapes.SHAPES)), help="A ready-made shape.")
@@ -31,27 +48,34 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--board", type=Board(), default=boards.DEFAULT, show_default=True)
 @click.option("--layout", "layout_path", type=_FILE, help="A layout of your own, in JSON, instead of a board's.")
 @click.option("--plot", type=_FILE, help="Draw the shape from the side and from above.")
+@click.option("--play", is_flag=True, help="Play it on the wristband.")
+@click.option("--anyway", is_flag=True, help="With --play: a plan that is not sure too.")
+@device
 @as_json
+@gathered(what=Asked, playing=Playing)
 def plan(
-    heights: tuple[str, ...],
-    shape: str | None,
-    path: Path | None,
+    what: Asked,
     begin: str | None,
     board: str,
     layout_path: Path | None,
     plot: Path | None,
+    playing: Playing,
     json: bool,
 ) -> None:
     """Plan a shape: one height in MM per bubble, or one of --shape and --file.
 
-    Says which bubbles go when, what to send to the wristband in each step, and which heights come of it. A shape
-    that cannot be had is answered with the nearest one found.
+    Says which bubbles go when, what to send to the wristband in each step, which heights come of it and between which
+    they may be. A shape that cannot be had is answered with the nearest one found. A plan that chance has a say in is
+    played with --anyway only.
     """
     from bubbleskin.contact.model import CompliantContact
     from bubbleskin.planner.search import plan as find
 
+    heights, shape, path = what
     if sum([bool(heights), shape is not None, path is not None]) != 1:
         raise InvalidInput("Say the shape in one way: a height in mm per bubble, or one of --shape and --file.")
+    if playing.anyway and not playing.play:
+        raise InvalidInput("--anyway goes with --play: it plays a plan that is not sure.")
     layout = Layout.from_file(layout_path) if layout_path else Layout.of_board(board)
     asked: Heights = (
         shapes.load(path) if path else shapes.SHAPES[shape](layout) if shape else shapes.parse_heights(heights)
@@ -77,12 +101,19 @@ def plan(
         click.echo(jsonlib.dumps(_facts(found), indent=2))
     else:
         _print(found)
+    if playing.play:
+        with connect(playing.device) as skin:
+            skin.play(found, anyway=playing.anyway)
+        click.echo("played", err=True)
 
 
 def _facts(found: "Plan") -> dict[str, object]:
     return {
         "asked_mm": found.asked_mm.round(3).tolist(),
         "predicted_mm": found.predicted_mm.round(3).tolist(),
+        "low_mm": found.low_mm.round(3).tolist(),
+        "high_mm": found.high_mm.round(3).tolist(),
+        "rms_mm": round(found.rms_mm, 3),
         "error_mm": round(found.error_mm, 3),
         "unreachable": list(found.unreachable),
         "sure": found.sure,
@@ -101,15 +132,16 @@ def _facts(found: "Plan") -> dict[str, object]:
 
 def _print(found: "Plan") -> None:
     console = Console()
-    table = Table("bubble", "asked (mm)", "predicted (mm)")
+    table = Table("bubble", "asked (mm)", "predicted (mm)", "between (mm)")
     for k in range(len(found.steps)):
         table.add_column(f"step {k + 1}: send (mm)")
     table.add_column("pressure (kPa)")
     for bubble in range(len(found.layout)):
         sent = [f"{step.target_mm[bubble]:.2f}" for step in found.steps]
         asked, predicted = found.asked_mm[bubble], found.predicted_mm[bubble]
+        between = f"{found.low_mm[bubble]:.2f} … {found.high_mm[bubble]:.2f}"
         held = f"{found.shape.pressure[bubble] / 1e3:.2f}"
-        table.add_row(str(bubble), f"{asked:.2f}", f"{predicted:.2f}", *sent, held)
+        table.add_row(str(bubble), f"{asked:.2f}", f"{predicted:.2f}", between, *sent, held)
     console.print(table)
     console.print(found.explain(), highlight=False, markup=False, soft_wrap=True)
 

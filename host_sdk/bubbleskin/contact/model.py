@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +27,12 @@ KZ, KXY, KC, KBASE = 10.0, 50.0, 300.0, 3000.0
 
 GRIP = 1e5
 """N/m. How stiffly a wristband holds sizes: 1 N of its neighbours makes a bubble 0.02 mm smaller, as its law's dead band does."""
+
+_SIZES = 5.0
+"""Sizes that are followed, times the rest height."""
+
+DOUBT = 1.3
+"""Springs of a sheet that nobody has measured are taken to be within this factor of the preset's, as drawn by `springs=0.3`."""
 
 LINE_VOLUME = 0.2e-6
 """m³ of air in valve node and tube of the simulated boards."""
@@ -59,6 +66,8 @@ class CompliantContact:
             positive(name, number(name, value), "N/m")
         self.kz, self.kxy, self.kc, self.kbase = float(kz), float(kxy), float(kc), float(kbase)
         self.kick, self.seed = number("kick", kick), whole("seed", seed, 0, SEED_MAX)
+        self.doubt = np.full(3, DOUBT)
+        """By which factor `kz`, `kxy` and `kc` may be off, (3,): what a plan must bear to be sure."""
         self.bubbles = _bubble_records(layout, self.balloons)
         gap = layout.positions_mm[:, None] - layout.positions_mm[None]
         close = np.argwhere(np.triu(np.hypot(*gap.transpose(2, 0, 1)) < 1e-3, 1))
@@ -80,16 +89,24 @@ class CompliantContact:
 
     def with_seed(self, seed: int) -> CompliantContact:
         """The same model with other random nudges."""
-        return CompliantContact(
-            self.layout,
-            self.balloons,
-            kz=self.kz,
-            kxy=self.kxy,
-            kc=self.kc,
-            kbase=self.kbase,
-            kick=self.kick,
-            seed=seed,
-        )
+        return self._changed(seed=whole("seed", seed, 0, SEED_MAX))
+
+    def with_doubt(self, factors: ArrayLike) -> CompliantContact:
+        """The same model whose `kz`, `kxy` and `kc` are known to these `factors`, one or (3,): 1.3 is 30 %, 1 exactly."""
+        doubt = np.broadcast_to(finite("factors", factors), (3,))
+        if (doubt < 1).any():
+            raise InvalidInput("A spring cannot be known better than to a factor of 1.")
+        return self._changed(doubt=np.array(doubt))
+
+    def with_springs(self, factors: ArrayLike, kick: float, seed: int) -> CompliantContact:
+        """A sheet that could be this one: `kz`, `kxy` and `kc` times `factors`, (3,), nudged otherwise."""
+        kz, kxy, kc = np.array([self.kz, self.kxy, self.kc]) * factors
+        return self._changed(kz=float(kz), kxy=float(kxy), kc=float(kc), kick=kick, seed=seed)
+
+    def _changed(self, **values: Any) -> CompliantContact:
+        other = copy(self)
+        vars(other).update(values)
+        return other
 
     def rest(self) -> Shape:
         """Every bubble without pressure."""
@@ -137,15 +154,16 @@ class CompliantContact:
 
         A wristband meters the air of each bubble, so that its neighbours raise its pressure and push it aside or up, but
         hardly make it smaller. `Shape.pressure` is what its sensor then says. On the way to a step all sizes go straight.
-        Raises `InvalidInput` for sizes below the rest height or of another number of bubbles.
+        Sizes below the rest height mean at rest. Raises `InvalidInput` for those that no bubble has, or of another number.
         """
         radii = 0.5e-3 * np.atleast_2d(finite("sizes_mm", sizes_mm))
         if radii.ndim != 2 or radii.shape[1] != len(self) or not len(radii):
             raise InvalidInput(
                 f"Sizes are a (k, {len(self)}) array, a height alone in mm per bubble and step; this one is {radii.shape}."
             )
-        if (radii < 0.99 * self.bubbles["outer"]).any() or (radii > 4.0 * self.bubbles["outer"]).any():
-            raise InvalidInput("A size is below a bubble's rest height, or above four times that.")
+        if (radii < 0).any() or (radii > _SIZES * self.bubbles["outer"]).any():
+            raise InvalidInput(f"A size is negative, or above {_SIZES:g} times the rest height of its bubble.")
+        radii = np.maximum(radii, self.bubbles["outer"])
         self._check(start, resolution)
         begin = self.bubbles["outer"] if start is None else start.radius
         springs = (*self.springs[:4], GRIP)

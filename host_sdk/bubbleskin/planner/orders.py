@@ -83,6 +83,41 @@ def three_groups(orders: Iterable[Order], wrong: Sequence[int]) -> Iterator[Orde
                 yield order
 
 
+def layers(shape: Shape) -> Order:
+    """The order that `shape` itself tells: who hangs on whom was there first, in as many groups as bubbles hang on each other.
+
+    Of two that touch, the one whose centre is higher hangs on the other. A bubble goes one group before all that it hangs on.
+    """
+    on: dict[int, list[int]] = {bubble: [] for bubble in range(len(shape))}
+    height = shape.position[:, 2]
+    for contact in shape.contacts:
+        upper, lower = contact.first, contact.second
+        if height[upper] < height[lower]:
+            upper, lower = lower, upper
+        if shape.lifted_mm[upper] > _LIFTED_MM and height[upper] - height[lower] > 1e-3 * _LIFTED_MM:
+            on[upper].append(lower)
+    depth = np.zeros(len(shape), int)
+    for bubble in np.argsort(height, kind="stable").tolist():  # Everybody below it has been seen.
+        depth[bubble] = max((depth[lower] + 1 for lower in on[bubble]), default=0)
+    return tuple(tuple(np.flatnonzero(depth == d).tolist()) for d in range(int(depth.max()), -1, -1))
+
+
+def one_by_one(order: Order, key: Array) -> Order:
+    """`order` with every bubble alone, those of one group by falling `key`, (n,)."""
+    return tuple((bubble,) for group in order for bubble in sorted(group, key=lambda i: -key[i]))
+
+
+def variants(order: Order, bubbles: Sequence[int]) -> Iterator[Order]:
+    """`order` with one of `bubbles` in another group, or in a group of its own before, between or after the others."""
+    for bubble in bubbles:
+        rest = [[i for i in group if i != bubble] for group in order]
+        for turn in range(len(rest)):
+            if bubble not in order[turn]:
+                yield _order(*(frozenset([*g, bubble] if k == turn else g) for k, g in enumerate(rest)))
+        for turn in range(len(rest) + 1):
+            yield _order(*(frozenset(g) for g in [*rest[:turn], [bubble], *rest[turn:]]))
+
+
 def _parts(group: Group, wrong: Group) -> list[Group]:
     return [group & wrong, group - wrong, *(frozenset([bubble]) for bubble in sorted(group))]
 

@@ -24,16 +24,16 @@ _NAMED = 4
 
 @dataclass(frozen=True, eq=False)
 class PlanStep:
-    """One step of a plan: all bubbles go to their pressures together, and settle."""
+    """One step of a plan: all bubbles go to their sizes together, and settle."""
 
     bubbles: tuple[int, ...]
     """Those that change."""
     pressure: Array
-    """Gauge, Pa, (n,)."""
+    """What the bubbles hold after it, neighbours' push included: gauge, Pa, (n,)."""
     target_mm: Array
-    """What to send: the height that each bubble would have alone at this pressure, (n,); 0 without pressure.
+    """What to send: the height that each bubble would have alone with this size, (n,); 0 at rest.
 
-    A device knows nothing of neighbours; a bubble that they lift is higher than its target.
+    A device holds sizes and knows nothing of neighbours; a bubble that they lift is higher than its target.
     """
     predicted_mm: Array
     """True heights after it, (n,)."""
@@ -49,6 +49,9 @@ class Plan:
     steps: tuple[PlanStep, ...]
     predicted_mm: Array
     """Heights at the end, (n,)."""
+    low_mm: Array
+    high_mm: Array
+    """Between which heights each bubble ends on a wristband whose springs, sizes and ways are not known exactly, (n,) each."""
     order: Order
     """The bubbles that change, group by group."""
     unreachable: tuple[int, ...]
@@ -57,7 +60,7 @@ class Plan:
     """The end, with contacts and snaps."""
     limit_mm: float
     sure: bool
-    """Whether it ends there with other random nudges and with straight pressures too. If not, chance has a say."""
+    """Whether it ends in this shape too where springs, sizes and ways are off as they may be. If not, chance has a say."""
     tried: int
     """Paths followed to find it."""
 
@@ -69,6 +72,11 @@ class Plan:
     def error_mm(self) -> float:
         """Largest distance of a height from what was asked."""
         return float(np.abs(self.predicted_mm - self.asked_mm).max())
+
+    @property
+    def rms_mm(self) -> float:
+        """Root mean square of the distances from what was asked: what is least for a shape that cannot be had."""
+        return float(np.sqrt(((self.predicted_mm - self.asked_mm) ** 2).mean()))
 
     @property
     def sequence(self) -> Sequence:
@@ -93,11 +101,7 @@ class Plan:
         if not self.steps:
             return "The array has this shape already: nothing to do."
         lines = [*_steps(self), *_reasons(self), *_corrections(self), *_snaps(self), *_misses(self)]
-        if not self.sure:
-            lines.append(
-                "Chance has a say: another nudge on the way, or pressures that go straight, end in another shape. "
-                "Go slowly, and measure the shape before you rely on it."
-            )
+        lines.append(_doubt(self))
         return "\n".join(lines)
 
 
@@ -114,7 +118,7 @@ def _steps(plan: Plan) -> list[str]:
     lines = [f"{count} steps."]
     done: set[int] = set()
     for number, step in enumerate(plan.steps, 1):
-        down = [i for i in step.bubbles if step.pressure[i] == 0]
+        down = [i for i in step.bubbles if step.target_mm[i] == 0]
         new = [i for i in step.bubbles if i not in done and i not in down]
         again = [i for i in step.bubbles if i in done and i not in down]
         done.update(new)
@@ -168,17 +172,27 @@ def _lifters(shape: Shape, bubble: int) -> list[int]:
 
 
 def _corrections(plan: Plan) -> list[str]:
-    off = plan.steps[-1].target_mm - plan.asked_mm
-    standing = (plan.shape.lifted_mm <= _LIFTED_MM) & (plan.shape.pressure > 0)
-    squeezed = np.flatnonzero(standing & (off > 0.1))
-    if not squeezed.size:
+    held = plan.steps[-1].target_mm
+    less = np.flatnonzero((plan.shape.lifted_mm > _LIFTED_MM) & (plan.asked_mm - held > _LIFTED_MM))
+    if not less.size:
         return []
-    most = int(squeezed[np.argmax(off[squeezed])])
+    most = int(less[np.argmax((plan.asked_mm - held)[less])])
     return [
-        f"Neighbours squeeze {plan.layout.names(squeezed.tolist())}, so more pressure than alone is needed, most for "
-        f"bubble {most}: {plan.shape.pressure[most] / 1e3:.2f} kPa, which alone would make it "
-        f"{plan.steps[-1].target_mm[most]:.2f} mm high instead of {plan.asked_mm[most]:.2f} mm."
+        f"Less is sent for {plan.layout.names(less.tolist())} than asked, since neighbours lift: least for bubble {most}, "
+        f"{held[most]:.2f} mm instead of {plan.asked_mm[most]:.2f} mm."
     ]
+
+
+def _doubt(plan: Plan) -> str:
+    wide = np.maximum(plan.high_mm - plan.predicted_mm, plan.predicted_mm - plan.low_mm)
+    most = int(np.argmax(wide))
+    where = f"bubble {most} between {plan.low_mm[most]:.1f} and {plan.high_mm[most]:.1f} mm"
+    if plan.sure:
+        return f"Sure: with springs, sizes and ways off as they may be it ends in this shape, at the most uncertain {where}."
+    return (
+        f"Chance has a say: with springs, sizes or ways a little off it can end in another shape, {where}. "
+        "It is played with anyway=True; go slowly, and measure the shape before you rely on it."
+    )
 
 
 def _snaps(plan: Plan) -> list[str]:
@@ -190,15 +204,23 @@ def _snaps(plan: Plan) -> list[str]:
 
 
 def _misses(plan: Plan) -> list[str]:
-    lines = []
-    for i in plan.unreachable:
-        if plan.shape.pressure[i] == 0:
-            why = "it has no pressure left to let go, its neighbours hold it up"
-        elif plan.steps[-1].target_mm[i] > plan.limit_mm - 0.01:
-            why = f"it has all the pressure it may have, {plan.limit_mm:g} mm alone"
-        else:
-            why = "in no order that was tried do its neighbours let it"
+    off = np.abs(plan.predicted_mm - plan.asked_mm)
+    furthest = sorted(plan.unreachable, key=lambda i: -off[i])
+    lines = [_why_missed(plan, bubble) for bubble in furthest[:_NAMED]]
+    if len(furthest) > _NAMED:
         lines.append(
-            f"Bubble {i} cannot be {plan.asked_mm[i]:.1f} mm high: the nearest is {plan.predicted_mm[i]:.1f} mm; {why}."
+            f"Nor can {plan.layout.names(sorted(furthest[_NAMED:]))} be as asked. This is the nearest shape that was "
+            f"found: {plan.rms_mm:.2f} mm RMS, {plan.error_mm:.2f} mm at most."
         )
     return lines
+
+
+def _why_missed(plan: Plan, i: int) -> str:
+    sent = plan.steps[-1].target_mm[i] if plan.steps else plan.shape.size_mm[i]
+    if sent == 0:
+        why = "it has no air left to let go, its neighbours hold it up"
+    elif sent > plan.limit_mm - 0.01:
+        why = f"it has all the air it may have, {plan.limit_mm:g} mm alone"
+    else:
+        why = "in no order that was tried do its neighbours let it"
+    return f"Bubble {i} cannot be {plan.asked_mm[i]:.1f} mm high: the nearest is {plan.predicted_mm[i]:.1f} mm; {why}."

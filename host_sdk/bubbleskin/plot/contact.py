@@ -157,7 +157,7 @@ def plot_plan(plan: Plan, contact: CompliantContact, start: Shape | None = None)
     shapes: list[Shape] = []
     now = start
     for step in plan.steps[:-1]:
-        now = contact.settle([step.pressure], start=now, ramp="height")
+        now = contact.settle_sizes(step.target_mm, now)
         shapes.append(now)
     shapes.append(plan.shape)
     titles = [f"step {k + 1}: {plan.layout.names(step.bubbles)}" for k, step in enumerate(plan.steps)] or ["no step"]

@@ -233,6 +233,15 @@ def playable(what: Playable) -> Sequence:
     return sequence
 
 
+def refuse_chance(what: Playable) -> None:
+    """Raise `InvalidInput` for a plan that is not sure to end in its shape."""
+    if not getattr(what, "sure", True):
+        raise InvalidInput(
+            "This plan is not sure: on a wristband a little other than the model it can end in another shape; its explain() "
+            "says where. Play it with anyway=True, plan another shape, or let fit_contact find the springs of your own sheet."
+        )
+
+
 def _ease(easing: str, p: float) -> float:
     p = min(max(p, 0.0), 1.0)
     return {"linear": p, "smooth": p * p * (3 - 2 * p), "in": p * p, "out": 1 - (1 - p) ** 2}[easing]

@@ -38,6 +38,9 @@ class PlaybackStatus:
 
 Progress = Callable[[PlaybackStatus], object]
 """What is called with the status at every step."""
+Told = Progress | None
+At = float | None
+"""Device time in s at which to begin; None: at once."""
 
 
 @dataclass(frozen=True)
