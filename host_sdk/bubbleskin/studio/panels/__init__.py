@@ -1,0 +1,1 @@
+"""The panels beside the array, a module each."""

@@ -1,0 +1,156 @@
+"""The studio's server: NiceGUI's pages on an application of our own, behind the guard, on one socket, for one run."""
+
+import asyncio
+import contextlib
+import errno
+import secrets
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+import uvicorn
+from fastapi import FastAPI
+from fastapi.responses import JSONResponse
+from nicegui import ui
+from nicegui.client import Client
+from starlette.staticfiles import StaticFiles
+
+from bubbleskin.errors import InvalidInput
+from bubbleskin.studio.desk import Desk
+from bubbleskin.studio.guard import Guard
+from bubbleskin.studio.owner import Owner
+from bubbleskin.studio.page import Page
+
+_STATIC = Path(__file__).parent / "static"
+_LAST_WORDS_S = 2
+"""Seconds that open connections have at the end."""
+
+
+class Studio:
+    """A studio: made once in a process, as NiceGUI's pages are; `serve` runs it until `leave` or Ctrl-C."""
+
+    def __init__(self, host: str, port: int, token: str = ""):
+        self.token = token or secrets.token_urlsafe(24)
+        self._host = host
+        self._socket = _listen(host, port)
+        self.port: int = self._socket.getsockname()[1]
+        self.owner = Owner(attended=is_attended)
+        shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+        self.address = f"http://{f'[{shown}]' if ':' in shown else shown}:{self.port}"
+        self.desk = Desk(self.owner, self.token, self.address)
+        self._server: _Server | None = None
+
+    @property
+    def url(self) -> str:
+        """The page's address, with the token."""
+        return f"{self.address}/?token={self.token}"
+
+    async def serve(self, device: str, ready: Callable[[], None] = lambda: None) -> None:
+        """Serve pages for the wristband at the URL `device`; `ready` is called once they can be opened."""
+        app = self._application()
+        guarded = Guard(app, token=self.token, host=self._host, port=self.port)
+        config = uvicorn.Config(
+            guarded,
+            log_level="warning",
+            lifespan="on",
+            timeout_graceful_shutdown=_LAST_WORDS_S,
+            ws="websockets-sansio",
+            server_header=False,
+        )
+        self._server = _Server(config, self.owner)
+        opening = asyncio.create_task(self.owner.open(device))
+        serving = asyncio.create_task(self._server.serve([self._socket]))
+        try:
+            await opening
+            ready()
+            await serving
+        finally:
+            await self.owner.close()
+            self._socket.close()
+
+    def leave(self) -> None:
+        """End `serve`, from whatever thread."""
+        if self._server:
+            self._server.should_exit = True
+
+    def _application(self) -> FastAPI:
+        app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+        app.mount("/studio", StaticFiles(directory=_STATIC))
+        owner, desk = self.owner, self.desk
+
+        @app.post("/stop")
+        async def stop() -> JSONResponse:
+            await owner.stop()
+            return _answer(owner.problem)
+
+        @app.post("/vent")
+        async def vent() -> JSONResponse:
+            await owner.vent()
+            return _answer(owner.problem)
+
+        @app.post("/notify")
+        async def notify() -> JSONResponse:
+            return _answer(desk.notify())
+
+        @ui.page("/", title="bubbleskin studio")
+        def page(tab: str = "live") -> None:
+            ui.add_head_html('<link rel="stylesheet" href="/studio/studio.css"><script defer src="/studio/stop.js"></script>')
+            Page(desk, tab)
+
+        ui.run_with(
+            app,
+            title="bubbleskin studio",
+            favicon=_STATIC / "icon.svg",
+            dark=None,
+            language="en-US",
+            tailwind=False,
+            gzip_middleware_factory=None,
+            show_welcome_message=False,
+            binding_refresh_interval=None,
+        )
+        return app
+
+
+def is_attended() -> bool:
+    """Whether any page is open."""
+    return any(client.has_socket_connection for client in Client.instances.values())
+
+
+def _answer(problem: str) -> JSONResponse:
+    return JSONResponse({"problem": problem}, 409 if problem else 200)
+
+
+class _Server(uvicorn.Server):
+    """Vents at once where it is told to end, and not when the last connection has closed."""
+
+    def __init__(self, config: uvicorn.Config, owner: Owner):
+        super().__init__(config)
+        self._owner = owner
+        self._loop = asyncio.get_running_loop()
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        self._loop.call_soon_threadsafe(lambda: asyncio.ensure_future(self._owner.vent()))
+        super().handle_exit(sig, frame)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """A socket at `host` and `port`, 0 for a free one."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+    except (OSError, UnicodeError) as error:
+        listening.close()
+        if getattr(error, "errno", None) == errno.EADDRINUSE:
+            raise InvalidInput(f"Port {port} is in use; give another with --port, or 0 for a free one.") from None
+        raise InvalidInput(f"Nothing can listen at {host}, port {port}: {error}.") from None
+    return listening
+
+
+def run(device: str, host: str, port: int, ready: Callable[[Studio], None]) -> None:
+    """Serve until Ctrl-C, which vents; `ready` is told once pages can be opened."""
+    studio = Studio(host, port)
+    with contextlib.suppress(asyncio.CancelledError):
+        asyncio.run(studio.serve(device, lambda: ready(studio)))
