@@ -25,6 +25,7 @@ from bubbleskin.cli import (
     plot,
     sim,
     store,
+    studio,
 )
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
@@ -48,6 +49,7 @@ for _command in (
     *monitor.commands,
     *store.commands,
     *sim.commands,
+    *studio.commands,
     *membrane.commands,
     *calibrate.commands,
     *plot.commands,

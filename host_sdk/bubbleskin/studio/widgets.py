@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from nicegui import ui
+from nicegui.element import Element
 from nicegui.elements.mixins.text_element import TextElement
-from nicegui.events import GenericEventArguments
 
 
 class Range(NamedTuple):
@@ -29,63 +29,53 @@ def button(words: str, act: Callable[[], Any], classes: str = "btn") -> TextElem
     return element.on("click", lambda: act(), js_handler="() => emit()")
 
 
+class Control(Element, component="static/control.js"):
+    """What a person sets: the browser's own slider, line of text or choice. `chosen(value)` is called with what they choose."""
+
+    def __init__(self, label: str, kind: str, value: float | str, chosen: Callable[[str], None], **more: Any):
+        super().__init__()
+        self.props.update(label=label, kind=kind, value=value, **more)
+        self.on("chosen", lambda event: chosen(str(event.args)))
+
+
 class Slider:
     """A number that is chosen with a slider. `change(value)` is called with what a person chooses, not with `set`."""
 
     def __init__(self, label: str, extent: Range, value: float, change: Callable[[float], None]):
         self._extent = extent
         self._change = change
-        with ui.element("label").classes("field"):
-            text("span", label)
-            self._output = text("span", "", "value").props("aria-hidden=true")
-            low, high, step, _ = extent
-            self._input = ui.element("input").props(f'type=range min={low} max={high} step={step} aria-label="{label}"')
-            self._input.on("input", self._moved, js_handler="(event) => emit(event.target.value)")
-        self.value = value
+        low, high, step, _ = extent
+        with ui.element("div").classes("field"):
+            self._label = text("span", label)
+            self._said = text("span", "", "value")
+            self._control = Control(label, "range", value, self._moved, min=low, max=high, step=step)
         self.set(value)
 
-    def set(self, value: float) -> None:
-        """Stand at `value`."""
-        if self._input.props.get("value") != value:
-            self._input.props["value"] = value
-        self._say(value)
-
-    def _say(self, value: float) -> None:
+    def set(self, value: float, label: str = "") -> None:
+        """Stand at `value`; `label`: be called something else."""
         self.value = value
+        if self._control.props["value"] != value:
+            self._control.props["value"] = value
         decimals = len(f"{self._extent.step:g}".partition(".")[2])
-        self._output.text = f"{value:.{decimals}f} {self._extent.unit}"
+        self._said.text = f"{value:.{decimals}f} {self._extent.unit}"
+        if label:
+            self._label.text = label
 
-    def _moved(self, event: GenericEventArguments) -> None:
-        value = min(max(float(event.args), self._extent.low), self._extent.high)
-        with self._input.props.suspend_updates():  # what comes back late would pull the slider from under the hand
-            self._input.props["value"] = value
-        self._say(value)
+    def _moved(self, chosen: str) -> None:
+        value = min(max(float(chosen), self._extent.low), self._extent.high)
+        self.set(value)
         self._change(value)
 
 
-def choice(label: str, options: Sequence[tuple[str, str]], value: str, change: Callable[[str], None]) -> None:
+def choice(label: str, options: Sequence[tuple[str, str]], value: str, change: Callable[[str], None]) -> Control:
     """One of several: (value, words) each."""
-    with ui.element("label").classes("field"):
+    with ui.element("div").classes("field"):
         text("span", label)
-        with ui.element("select") as select:
-            for name, words in options:
-                text("option", words).props["value"] = name
-        select.props["value"] = value
-        select.on("change", lambda event: change(str(event.args)), js_handler="(event) => emit(event.target.value)")
+        return Control(label, "", value, change, options=[list(option) for option in options])
 
 
-def field(label: str, value: str, hint: str = "") -> Callable[[], str]:
-    """A line of text to be typed; returns what tells it."""
-    typed = value
-
-    def take(event: GenericEventArguments) -> None:
-        nonlocal typed
-        typed = str(event.args)
-
-    with ui.element("label").classes("field"):
+def field(label: str, value: str, change: Callable[[str], None], hint: str = "") -> Control:
+    """A line of text to be typed."""
+    with ui.element("div").classes("field"):
         text("span", label)
-        line = ui.element("input").props('type=text spellcheck=false autocomplete=off')
-        line.props["value"] = value
-        line.props["placeholder"] = hint
-        line.on("input", take, js_handler="(event) => emit(event.target.value)")
-    return lambda: typed
+        return Control(label, "text", value, change, hint=hint)

@@ -46,11 +46,12 @@ class LivePanel:
     def _chose(self) -> None:
         heights = self._owner.wanted_mm
         if heights is not None and self._array.chosen < len(heights):
-            self._one.set(round(float(heights[self._array.chosen]), 1))
+            self._one.set(round(float(heights[self._array.chosen]), 1), f"Bubble {self._array.chosen}")
 
     def refresh(self) -> None:
         """Say which faults there are; again only where they have changed."""
         state = self._owner.state
+        self._chose()
         found = {f"Bubble {bubble}": names for bubble, names in enumerate(state.faults) if names} if state else {}
         if state and state.board_faults:
             found["Board"] = state.board_faults
@@ -74,24 +75,26 @@ class LivePanel:
 
 def choose_device(desk: Desk) -> None:
     """The device picker: simulated boards with their options, the ports that are found, any other URL."""
-    chosen = {"board": "", "rubber": ""}
-    choices = [(f"sim://{name}", f"Simulated {name}") for name in boards.NAMES]
-    choices = [(port, f"Wristband at {port}") for port in attached()] + choices
-    current = desk.owner.url.partition("?")[0]
+    url = desk.owner.url
+    current = url.partition("?")[0]
+    choices = [(port, f"Wristband at {port}") for port in attached()]
+    choices += [(f"sim://{name}", f"Simulated {name}") for name in boards.NAMES]
     if current and current not in dict(choices):
         choices.insert(0, (current, current))
-    chosen["board"] = current or choices[0][0]
-    text("h2", "Wristband")
-    choice("Device", choices, chosen["board"], lambda value: chosen.update(board=value))
-    options = field("Options of a simulated one", _options(desk.owner.url), "seed=3&spread=0.1&rubber=real")
-    other = field("Or any URL", "", "/dev/ttyACM0, socket://host:7707")
+    wanted = {"device": current or choices[0][0], "options": _options(url), "other": ""}
 
     def connect() -> None:
-        url = other().strip() or chosen["board"]
-        if url == chosen["board"] and url.startswith("sim://") and options().strip():
-            url = f"{url}?{options().strip().lstrip('?')}"
-        background_tasks.create(desk.owner.open(url), name="connect")
+        device = wanted["other"].strip() or wanted["device"]
+        options = wanted["options"].strip().lstrip("?")
+        if device == wanted["device"] and device.startswith("sim://") and options:
+            device = f"{device}?{options}"
+        background_tasks.create(desk.owner.open(device), name="connect")
 
+    text("h2", "Wristband")
+    choice("Device", choices, wanted["device"], lambda value: wanted.update(device=value))
+    hint = "seed=3&spread=0.1&rubber=real"
+    field("Options of a simulated one", wanted["options"], lambda value: wanted.update(options=value), hint)
+    field("Or any URL", "", lambda value: wanted.update(other=value), "/dev/ttyACM0, socket://host:7707")
     button("Connect", connect, "btn main")
 
 
