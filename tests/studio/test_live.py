@@ -35,7 +35,7 @@ def test_a_slider_raises_all_by_keyboard(studio, visit):
 def test_the_page_says_what_the_wristband_does(studio, visit):
     page = visit()
     page.get_by_role("slider", name="All bubbles").fill("9")
-    page.locator("[data-bubble='2'][aria-label*='9.0 mm, target 9.0 mm'][aria-label$='unsure'], [data-bubble='2'][aria-label$='9.0 mm, settled']").wait_for()
+    page.locator("[data-bubble='2'][aria-label^='Bubble 2: 9.0 mm, target 9.0 mm']").wait_for()
     page.get_by_text("All figures").click()
     page.locator("tbody tr:nth-child(3)", has_text="9.00").wait_for()
     for words in ("active", "kPa", "± "):

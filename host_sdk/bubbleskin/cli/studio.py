@@ -30,14 +30,12 @@ PORT = 8808
     show_default=True,
     help="The wristband to begin with; another can be chosen in the page. Simulated ones run in real time.",
 )
-@click.option(
-    "--port", type=Whole(0, 65535), default=PORT, show_default=True, help="Port of the page; 0: a free one."
-)
+@click.option("--port", type=Whole(0, 65535), default=PORT, show_default=True, help="Port of the page; 0: a free one.")
 @click.option(
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Address at which to listen. Whoever reaches it and has the token plays the wristband: leave it but in a network you trust.",
+    help="Address at which to listen. Anything but loopback lets your network in, with the token only, unencrypted.",
 )
 @click.option(
     "--open/--no-open", "opened", default=None, help="Open the page in a browser. Default: where there is a screen."

@@ -66,7 +66,9 @@ class Guard:
         origin = headers.get("origin")
         if origin is not None and origin.partition("://")[2] != host:
             return "A page of another origin asks; only the studio's own pages may."
-        if not any(secrets.compare_digest(given.encode(), self._token.encode()) for given in self._given(scope, headers)):
+        if not any(
+            secrets.compare_digest(given.encode(), self._token.encode()) for given in self._given(scope, headers)
+        ):
             return "The token of this run is missing; open the address that `bubbleskin studio` printed."
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > BODY_MAX:

@@ -76,7 +76,7 @@ class Owner:
     # The device.
 
     async def open(self, url: str) -> None:
-        """Let go of the wristband that is there, vented, and take the one at `url`; where it cannot be had, `problem` says why."""
+        """Vent and let go of the wristband there is, and take the one at `url`; where it cannot be had, `problem` says why."""
         async with self._changing:
             await self._release()
             self.url = in_real_time(url or f"sim://{boards.DEFAULT}")

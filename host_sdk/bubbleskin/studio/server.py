@@ -95,7 +95,9 @@ class Studio:
 
         @ui.page("/", title="bubbleskin studio")
         def page(tab: str = "live") -> None:
-            ui.add_head_html('<link rel="stylesheet" href="/studio/studio.css"><script defer src="/studio/stop.js"></script>')
+            ui.add_head_html(
+                '<link rel="stylesheet" href="/studio/studio.css"><script defer src="/studio/stop.js"></script>'
+            )
             Page(desk, tab)
 
         ui.run_with(

@@ -15,7 +15,7 @@ class PulsePanel:
         pulse = desk.pulse
         with ui.element("section").classes("card"):
             text("h2", "Pulse")
-            text("p", "The inner bubbles rise together, then the framing ring one after the other, and back: a notification that is felt.")
+            text("p", "The inner bubbles rise together, then the ring around them one after the other, and back.")
             self._rate = Slider("Rate", RATE, pulse.rate, lambda value: setattr(pulse, "rate", value))
             self._depth = Slider("Depth", DEPTH, pulse.depth_mm, lambda value: setattr(pulse, "depth_mm", value))
             with ui.element("div").classes("row"):

@@ -1,0 +1,77 @@
+"""`bubbleskin studio` as a process of its own: what it prints, who comes in, and how it ends."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+
+import pytest
+
+
+@pytest.fixture
+def studio():
+    """A studio in a process: the process, and what it printed."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "bubbleskin", "studio", "--port", "0", "--json", "--device", "sim://wristband7"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    yield process, json.loads(process.stdout.readline())
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    process.stderr.close()
+
+
+def post(url, **headers):
+    request = urllib.request.Request(url, method="POST", headers=headers)
+    try:
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return answer.status, json.load(answer)
+    except urllib.error.HTTPError as refused:
+        with refused:
+            return refused.code, refused.read().decode()
+
+
+@pytest.mark.slow
+def test_a_notification_pulses_and_ctrl_c_ends_it(studio):
+    process, told = studio
+    address = told["url"].partition("/?")[0]
+    assert address.startswith("http://127.0.0.1:")
+    assert post(f"{address}/notify")[0] == 403
+    assert post(f"{address}/notify?token={told['token']}", Origin="http://evil.example")[0] == 403
+    assert post(f"{address}/notify?token={told['token']}") == (200, {"problem": ""})
+    assert post(f"{address}/vent", Authorization=f"Bearer {told['token']}") == (200, {"problem": ""})
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert (process.returncode, out, err.lstrip()) == (130, "", "Stopped.\n")
+
+
+@pytest.mark.slow
+def test_a_port_in_use_is_said(command):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        status, _, err = command("studio", "--port", port, "--no-open")
+    assert (status, err) == (2, f"Port {port} is in use; give another with --port, or 0 for a free one.\n")
+
+
+def test_without_its_extra_it_says_what_to_install(command, monkeypatch):
+    monkeypatch.setitem(sys.modules, "nicegui", None)
+    status, _, err = command("studio")
+    assert status == 1
+    assert "pip install 'bubbleskin[studio]'" in err
+
+
+def test_the_core_knows_nothing_of_it():
+    code = (
+        "import sys, bubbleskin, bubbleskin.cli.command;"
+        "print([name for name in ('nicegui', 'fastapi', 'starlette') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"

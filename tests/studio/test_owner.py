@@ -1,0 +1,126 @@
+"""The owner of the wristband without any page: what is asked last counts, stop and vent come first, nobody leaves it standing."""
+
+import asyncio
+import time
+
+import numpy as np
+import pytest
+
+from bubbleskin.studio import owner as owner_module
+from bubbleskin.studio.owner import Owner, in_real_time
+
+FLAT_MM = 5.4
+
+
+def with_owner(use, url="sim://wristband7", attended=lambda: True):
+    async def run():
+        owner = Owner(attended)
+        await owner.open(url)
+        try:
+            return await use(owner)
+        finally:
+            await owner.close()
+
+    return asyncio.run(run())
+
+
+async def until(true, seconds=5.0):
+    end = time.monotonic() + seconds
+    while not true() and time.monotonic() < end:
+        await asyncio.sleep(0.01)
+    assert true()
+
+
+def heights(owner):
+    return owner.skin.simulated.height_mm
+
+
+def test_of_many_wishes_the_newest_is_shown():
+    async def use(owner):
+        for height in np.linspace(6, 10, 200):
+            owner.ask(np.full(7, height))
+        await until(lambda: np.all(heights(owner) > 9.7))
+        assert np.all(owner.wanted_mm == 10.0)
+
+    with_owner(use)
+
+
+def test_one_bubble_is_asked_and_the_others_stay():
+    async def use(owner):
+        await until(lambda: owner.state)
+        owner.ask(np.full(7, 8.0))
+        owner.ask_one(3, 11.0)
+        owner.ask_one(9, 11.0)  # there is none
+        await until(lambda: heights(owner)[3] > 10.5)
+        assert np.all(np.delete(heights(owner), 3) < 8.6)
+
+    with_owner(use)
+
+
+def test_stop_drops_what_was_asked():
+    async def use(owner):
+        await until(lambda: owner.state)
+        owner.ask(np.full(7, 9.0))
+        await owner.stop()
+        await asyncio.sleep(0.3)
+        assert np.all(heights(owner) < FLAT_MM)
+        assert owner.activity == ""
+
+    with_owner(use)
+
+
+def test_the_end_vents():
+    async def use(owner):
+        owner.ask(np.full(7, 9.0))
+        await until(lambda: np.all(heights(owner) > 8.5))
+        return owner.skin.simulated
+
+    board = with_owner(use)
+    board.step(0.4)  # less than the second after which the wristband would do it by itself
+    assert np.all(board.height_mm < FLAT_MM)
+
+
+def test_where_nobody_looks_everything_vents(monkeypatch):
+    monkeypatch.setattr(owner_module, "GRACE_S", 0.2)
+    there = [True]
+
+    async def use(owner):
+        owner.ask(np.full(7, 9.0))
+        await until(lambda: np.all(heights(owner) > 8.5))
+        there.clear()
+        await until(lambda: np.all(heights(owner) < FLAT_MM))
+
+    with_owner(use, attended=lambda: bool(there))
+
+
+def test_a_device_that_is_not_there_is_a_sentence():
+    async def use(owner):
+        assert owner.skin is None
+        owner.ask(np.full(7, 9.0))
+        await owner.stop()
+        return owner.problem
+
+    assert "There is no board 'wristband8'" in with_owner(use, "sim://wristband8")
+
+
+def test_what_the_wristband_refuses_is_a_sentence():
+    async def use(owner):
+        owner.ask(np.full(7, 99.0))
+        await until(lambda: owner.problem)
+        return owner.problem
+
+    assert "99" in with_owner(use)
+
+
+@pytest.mark.parametrize(
+    ("url", "played"),
+    [
+        ("sim://wristband7", "sim://wristband7?realtime=1"),
+        ("sim://wristband7?seed=3", "sim://wristband7?seed=3&realtime=1"),
+        ("sim://wristband7?realtime=0", "sim://wristband7?realtime=0"),
+        ("/dev/ttyACM0", "/dev/ttyACM0"),
+        ("socket://lab:7707", "socket://lab:7707"),
+    ],
+)
+def test_simulated_boards_keep_the_wall_clocks_pace(url, played):
+    assert in_real_time(url) == played
