@@ -5,6 +5,7 @@ import os
 import shutil
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -60,6 +61,13 @@ class Running:
     @property
     def mode(self):
         return self.owner.state.mode if self.owner.state else ""
+
+
+@pytest.fixture
+def in_a_loop():
+    """`in_a_loop(coroutine)`: its result, from a thread: while Chromium is open Playwright has this thread's loop."""
+    with ThreadPoolExecutor(1) as pool:
+        yield lambda coroutine: pool.submit(asyncio.run, coroutine).result()
 
 
 @pytest.fixture(scope="package")

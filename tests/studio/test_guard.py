@@ -1,7 +1,5 @@
 """Who comes in: requests and sockets straight to the guard, before an application that would answer all of them."""
 
-import asyncio
-
 import pytest
 
 from bubbleskin.studio.guard import BODY_MAX, Guard
@@ -27,39 +25,49 @@ async def answers_all(scope, receive, send):
     await send({"type": "http.response.body", "body": str(taken).encode()})
 
 
-def ask(path="/", *headers, kind="http", query="", body=(b"",), host="127.0.0.1", app=answers_all):
-    """What comes back: messages of ASGI."""
-    sent = []
-    given = dict(headers) if "host" in dict(headers) else {"host": OURS} | dict(headers)
-    scope = {
-        "type": kind,
-        "method": "GET",
-        "path": path,
-        "query_string": query.encode(),
-        "headers": [(name.encode(), value.encode()) for name, value in given.items()],
-    }
-    parts = [{"type": "http.request", "body": part, "more_body": True} for part in body]
-    parts[-1]["more_body"] = False
+@pytest.fixture
+def ask(in_a_loop):
+    """`ask(path, *headers, …)`: what comes back, messages of ASGI."""
 
-    async def receive():
-        return parts.pop(0)
+    def run(path="/", *headers, kind="http", query="", body=(b"",), host="127.0.0.1"):
+        sent = []
+        scope = {
+            "type": kind,
+            "method": "GET",
+            "path": path,
+            "query_string": query.encode(),
+            "headers": [(name.encode(), value.encode()) for name, value in ({"host": OURS} | dict(headers)).items()],
+        }
+        parts = [{"type": "http.request", "body": part, "more_body": True} for part in body]
+        parts[-1]["more_body"] = False
 
-    async def send(message):
-        sent.append(message)
+        async def receive():
+            return parts.pop(0)
 
-    asyncio.run(Guard(app, token=TOKEN, host=host, port=8808)(scope, receive, send))
-    return sent
+        async def send(message):
+            sent.append(message)
+
+        in_a_loop(Guard(answers_all, token=TOKEN, host=host, port=8808)(scope, receive, send))
+        return sent
+
+    return run
 
 
-def status(*args, **kwargs):
-    sent = ask(*args, **kwargs)
-    return sent[0].get("status") if sent else None
+@pytest.fixture
+def status(ask):
+    """The status of what comes back; None where nothing does."""
+
+    def run(*args, **kwargs):
+        sent = ask(*args, **kwargs)
+        return sent[0].get("status") if sent else None
+
+    return run
 
 
 @pytest.mark.parametrize(
     "path", ["/", "/stop", "/vent", "/notify", "/studio/stop.js", "/_nicegui/3.18.0/static/nicegui.js"]
 )
-def test_without_the_token_nothing_is_answered(path):
+def test_without_the_token_nothing_is_answered(ask, status, path):
     sent = ask(path)
     assert sent[0]["status"] == 403
     assert b"token of this run is missing" in sent[1]["body"]
@@ -71,11 +79,11 @@ def test_without_the_token_nothing_is_answered(path):
 @pytest.mark.parametrize(
     "header", [COOKIE, ("authorization", f"Bearer {TOKEN}"), ("authorization", f"bearer  {TOKEN}")]
 )
-def test_with_the_token_all_is(header):
+def test_with_the_token_all_is(status, header):
     assert status("/stop", header) == 200
 
 
-def test_the_address_brings_the_token_once_and_loses_it():
+def test_the_address_brings_the_token_once_and_loses_it(ask, status):
     first = ask("/", query=f"token={TOKEN}&tab=pulse")[0]
     headers = dict(first["headers"])
     assert first["status"] == 303
@@ -85,29 +93,29 @@ def test_the_address_brings_the_token_once_and_loses_it():
     assert status("/", query="token=wrong") == 403
 
 
-def test_the_address_opens_the_page_and_the_webhook_only():
+def test_the_address_opens_the_page_and_the_webhook_only(status):
     assert status("/notify", query=f"token={TOKEN}") == 200
     assert status("/stop", query=f"token={TOKEN}") == 403
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:9999", "null", "https://127.0.0.1"])
-def test_another_origin_is_refused_even_with_the_token(origin):
+def test_another_origin_is_refused_even_with_the_token(ask, status, origin):
     assert status("/notify", COOKIE, ("origin", origin)) == 403
     assert ask("/_nicegui_ws/socket.io/", COOKIE, ("origin", origin), kind="websocket")[0]["type"] == "websocket.close"
 
 
-def test_our_own_origin_is_not():
+def test_our_own_origin_is_not(status):
     assert status("/notify", COOKIE, ("origin", f"http://{OURS}")) == 200
 
 
-def test_sockets_need_the_token_too():
+def test_sockets_need_the_token_too(ask):
     assert ask("/_nicegui_ws/socket.io/", kind="websocket")[0]["type"] == "websocket.close"
     assert ask("/_nicegui_ws/socket.io/", COOKIE, kind="websocket")[0]["type"] == "websocket.accept"
     refused = ask("/_nicegui_ws/socket.io/", kind="websocket", query=f"token={TOKEN}")
     assert refused[0]["type"] == "websocket.close"
 
 
-def test_a_name_that_somebody_else_has_bound_to_this_computer_is_refused():
+def test_a_name_that_somebody_else_has_bound_to_this_computer_is_refused(status):
     assert status("/", COOKIE, ("host", "evil.example:8808")) == 403
     for name in ("localhost:8808", "[::1]:8808", "127.0.0.1"):
         assert status("/", COOKIE, ("host", name)) == 200
@@ -115,17 +123,17 @@ def test_a_name_that_somebody_else_has_bound_to_this_computer_is_refused():
 
 
 @pytest.mark.parametrize("length", [str(BODY_MAX + 1), "-1", "many"])
-def test_what_says_that_it_is_too_large_is_refused(length):
+def test_what_says_that_it_is_too_large_is_refused(status, length):
     assert status("/terrain", COOKIE, ("content-length", length)) == 403
 
 
-def test_what_is_larger_than_it_says_is_cut_off():
+def test_what_is_larger_than_it_says_is_cut_off(ask, status):
     half = b"x" * (BODY_MAX // 2)
     assert status("/terrain", COOKIE, ("content-length", "5"), body=(half, half)) == 200
     assert ask("/terrain", COOKIE, ("content-length", "5"), body=(half, half, b"x")) == []
 
 
-def test_no_page_shows_it_in_a_frame_or_learns_its_address():
+def test_no_page_shows_it_in_a_frame_or_learns_its_address(ask):
     headers = dict(ask("/", COOKIE)[0]["headers"])
     assert headers[b"x-frame-options"] == b"DENY"
     assert headers[b"referrer-policy"] == b"no-referrer"

@@ -12,16 +12,22 @@ from bubbleskin.studio.owner import Owner, in_real_time
 FLAT_MM = 5.4
 
 
-def with_owner(use, url="sim://wristband7", attended=lambda: True):
-    async def run():
-        owner = Owner(attended)
-        await owner.open(url)
-        try:
-            return await use(owner)
-        finally:
-            await owner.close()
+@pytest.fixture
+def with_owner(in_a_loop):
+    """`with_owner(use, url, attended)`: what `use(owner)` returns; the owner is closed after it."""
 
-    return asyncio.run(run())
+    def run(use, url="sim://wristband7", attended=lambda: True):
+        async def whole():
+            owner = Owner(attended)
+            await owner.open(url)
+            try:
+                return await use(owner)
+            finally:
+                await owner.close()
+
+        return in_a_loop(whole())
+
+    return run
 
 
 async def until(true, seconds=5.0):
@@ -35,7 +41,7 @@ def heights(owner):
     return owner.skin.simulated.height_mm
 
 
-def test_of_many_wishes_the_newest_is_shown():
+def test_of_many_wishes_the_newest_is_shown(with_owner):
     async def use(owner):
         for height in np.linspace(6, 10, 200):
             owner.ask(np.full(7, height))
@@ -45,7 +51,7 @@ def test_of_many_wishes_the_newest_is_shown():
     with_owner(use)
 
 
-def test_one_bubble_is_asked_and_the_others_stay():
+def test_one_bubble_is_asked_and_the_others_stay(with_owner):
     async def use(owner):
         await until(lambda: owner.state)
         owner.ask(np.full(7, 8.0))
@@ -57,7 +63,7 @@ def test_one_bubble_is_asked_and_the_others_stay():
     with_owner(use)
 
 
-def test_stop_drops_what_was_asked():
+def test_stop_drops_what_was_asked(with_owner):
     async def use(owner):
         await until(lambda: owner.state)
         owner.ask(np.full(7, 9.0))
@@ -69,7 +75,7 @@ def test_stop_drops_what_was_asked():
     with_owner(use)
 
 
-def test_the_end_vents():
+def test_the_end_vents(with_owner):
     async def use(owner):
         owner.ask(np.full(7, 9.0))
         await until(lambda: np.all(heights(owner) > 8.5))
@@ -80,7 +86,7 @@ def test_the_end_vents():
     assert np.all(board.height_mm < FLAT_MM)
 
 
-def test_where_nobody_looks_everything_vents(monkeypatch):
+def test_where_nobody_looks_everything_vents(with_owner, monkeypatch):
     monkeypatch.setattr(owner_module, "GRACE_S", 0.2)
     there = [True]
 
@@ -93,7 +99,7 @@ def test_where_nobody_looks_everything_vents(monkeypatch):
     with_owner(use, attended=lambda: bool(there))
 
 
-def test_a_device_that_is_not_there_is_a_sentence():
+def test_a_device_that_is_not_there_is_a_sentence(with_owner):
     async def use(owner):
         assert owner.skin is None
         owner.ask(np.full(7, 9.0))
@@ -103,7 +109,7 @@ def test_a_device_that_is_not_there_is_a_sentence():
     assert "There is no board 'wristband8'" in with_owner(use, "sim://wristband8")
 
 
-def test_what_the_wristband_refuses_is_a_sentence():
+def test_what_the_wristband_refuses_is_a_sentence(with_owner):
     async def use(owner):
         owner.ask(np.full(7, 99.0))
         await until(lambda: owner.problem)
