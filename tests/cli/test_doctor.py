@@ -58,3 +58,46 @@ def test_where_nothing_can_be_kept_that_is_a_failure(tmp_path):
     assert "cannot be kept" in done.stderr.splitlines()[-1]
     assert "XDG_CACHE_HOME" in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
+
+
+def findings(command, *arguments):
+    status, out, err = command("doctor", "--json", *arguments)
+    assert status == 0, err
+    return {finding["what"]: finding for finding in json.loads(out)["findings"]}
+
+
+def test_a_wristband_is_asked_and_nothing_moves(command):
+    found = findings(command, "--device", "sim://wristband7")
+    assert found["wristband"]["found"].startswith("wristband7, firmware 0.1.0")
+    assert found["its fault log"]["found"] == "nothing that is not acknowledged"
+    assert not any(name.startswith("the line") for name in found)
+
+
+def test_a_good_line_gets_no_advice(command):
+    found = findings(command, "--device", "sim://wristband7", "--link", "2")
+    assert found["the line: damaged frames"]["found"] == "0"
+    assert " 0 lost" in found["the line: telemetry"]["found"]
+    assert found["the line: round trips"]["remedy"] == ""
+
+
+def test_a_bad_line_gets_some(command):
+    found = findings(command, "--device", "sim://wristband7?loss=0.05&seed=2", "--link", "3")
+    assert " 0 lost" not in found["the line: telemetry"]["found"]
+    assert "cable" in found["the line: round trips"]["remedy"]
+
+
+@pytest.mark.parametrize("seconds", ["0", "nan", "1e9", "long"])
+def test_how_long_has_limits(command, seconds):
+    status, _, err = command("doctor", "--device", "sim://wristband7", "--link", seconds)
+    assert status == 2
+    assert "--link is" in err
+
+
+def test_the_rule_for_linux_is_printed_alone(command):
+    status, out, _ = command("doctor", "--udev")
+    assert status == 0
+    lines = out.splitlines()
+    assert lines[0].startswith("# ")
+    assert lines[1:] == [
+        'SUBSYSTEM=="tty", ATTRS{idVendor}=="2e8a", ATTRS{idProduct}=="0005", MODE="0660", TAG+="uaccess"'
+    ]
