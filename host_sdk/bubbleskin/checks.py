@@ -202,6 +202,13 @@ def instance(name: str, value: Any, kind: type | tuple[type, ...], say: str) -> 
     return value
 
 
+def function(name: str, value: Any, say: str) -> Any:
+    """``value`` where it can be called; ``say``: what to give instead, such as 'a function of one number'."""
+    if not callable(value):
+        raise InvalidInput(f"{name} is {shown(value)}; give {say}.")
+    return value
+
+
 def several(name: str, value: Any, say: str) -> list[Any]:
     """The entries of ``value`` where it has some and is no text; ``say``: what to give instead."""
     if isinstance(value, str | bytes | dict) or not isinstance(value, Iterable):

@@ -17,7 +17,7 @@ NUMBERS = Path("docs/pictures/patterns.csv")
 WORDS = {  # each at six moments, so many seconds apart
     "ripple": ("ripple", 0.25),
     "wave": ("wave", 0.25),
-    "pulse": ("pulse", 0.6),
+    "pulse": ("pulse", 0.75),
     "noise": ("noise", 1.0),
     "seq": ("seq(0, wave, 1)", 0.5),
 }

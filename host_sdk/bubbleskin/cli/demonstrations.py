@@ -1,24 +1,29 @@
-"""`bubbleskin demo terrain`, and the other demonstrations of the paper."""
+"""`bubbleskin demo pulse`, `demo terrain` and `demo buttons`: the paper's demonstrations."""
 
 import contextlib
 import json as jsonlib
 import math
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import click
 import numpy as np
 from click.core import ParameterSource
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.live import Live
 
 from bubbleskin import boards
 from bubbleskin.cli.device import demo
-from bubbleskin.cli.options import Real, as_json, gathered
+from bubbleskin.cli.options import LOOPS, Real, as_json, gathered
 from bubbleskin.connecting import connect
+from bubbleskin.demonstrations import keyboard
+from bubbleskin.demonstrations import pulse as pulses
+from bubbleskin.demonstrations.buttons import Buttons
 from bubbleskin.demonstrations.landscapes import LANDSCAPES
 from bubbleskin.demonstrations.pointer import PATHS, RATE_HZ, SPEED_MM_S, Moment, Pointer, follow
 from bubbleskin.demonstrations.terrain import MODES, WIDTH_MM, Terrain
+from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.shape.heightfield import FILLS
 from bubbleskin.skin import Skin
@@ -115,6 +120,83 @@ def _felt(felt: Terrain, off: list[float]) -> str:
     rms = math.sqrt(sum(off) / len(off))
     how_well = "" if math.isnan(rms) else f", true heights within {rms:.2f} mm RMS of those asked"
     return f"Felt {felt.name} in {len(off)} shapes, {RATE_HZ:g} a second{how_well}."
+
+
+@demo.command("pulse")
+@click.option("--rate", type=Real(above_zero=True, unit="Hz"), default=pulses.RATE_HZ, show_default=True, help="In Hz.")
+@click.option(
+    "--depth", type=Real(above_zero=True, unit="mm"), default=pulses.DEPTH_MM, show_default=True, help="In mm."
+)
+@click.option("--loops", type=LOOPS, default=pulses.LOOPS, show_default=True, help="How many of them; 0: until Ctrl-C.")
+@click.option(
+    "--per-line", is_flag=True, help="Whenever a line comes on standard input, as of a program that notifies."
+)
+@_device
+def pulse(rate: float, depth: float, loops: int, per_line: bool, device: str | None) -> None:
+    """The pulse: the inner bubbles together, then the framing ring one after the other; once, or as a notification.
+
+    `tail -f /var/log/messages | bubbleskin demo pulse --per-line` is felt whenever a line comes; several that come
+    while it pulses are felt as one.
+    """
+    if per_line and not loops:
+        raise InvalidInput(
+            "A pulse without end is felt once, however many lines come: give --loops, or leave out --per-line."
+        )
+    console = Console()
+    with connect(_url(device)) as skin:
+        sequence = pulses.pulse(skin.layout, rate_hz=rate, depth_mm=depth, loops=loops)
+        try:
+            if not per_line:
+                skin.play(sequence)
+            for batch in pulses.pulse_per_line(skin, sys.stdin, sequence) if per_line else ():
+                more = f" and {len(batch) - 1} more" if len(batch) > 1 else ""
+                console.print(f"Felt: {batch[0]}{more}", markup=False, highlight=False)
+        finally:
+            skin.vent()
+
+
+@demo.command("buttons")
+@_device
+@as_json
+def buttons(device: str | None, json: bool) -> None:
+    """Digital buttons by the keyboard: a bubble peeks out where one is, and rises when it is pressed.
+
+    Arrows move, space presses, p paints on the way, digits press their bubble, c lets all down, q ends. Prints which bubble
+    was pressed, with --json a line of it for scripts; keys are read from standard input where that is no terminal.
+    """
+    console = Console()
+    with connect(_url(device)) as skin, contextlib.ExitStack() as shown:
+        pad = Buttons.on(skin)
+        said = [keyboard.HELP]
+        live = None
+        if console.is_terminal and not json:
+            live = shown.enter_context(Live(console=console, auto_refresh=False, transient=True))
+
+        def pressed(bubble: int) -> None:
+            said[:] = [f"Bubble {bubble} was pressed."]
+            if not live:
+                click.echo(jsonlib.dumps({"bubble": bubble, "time": skin.state().time}) if json else said[0])
+
+        for bubble in range(skin.info.bubbles):
+            pad.on_press(bubble, pressed)
+        taker = keyboard.Keyboard(pad)
+        going = True
+        while going:
+            if live:
+                live.update(_drawn(pad, said[0]), refresh=True)
+            going = all(taker.take(key) for key in keyboard.keys(_typed()))
+        skin.vent()
+
+
+def _drawn(pad: Buttons, said: str) -> RenderableType:
+    from bubbleskin.plot.demonstrations import draw_buttons
+
+    return draw_buttons(pad, said)
+
+
+def _typed() -> str:
+    """The next key, or several that were typed at once; empty at the end of the input."""
+    return click.getchar() if sys.stdin.isatty() else sys.stdin.read(1)
 
 
 commands = [demo]

@@ -1,10 +1,11 @@
-"""The demonstrations in a terminal: a terrain with the wristband on it."""
+"""The demonstrations in a terminal: a terrain with the wristband on it, and buttons."""
 
 import numpy as np
 from rich.columns import Columns
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from bubbleskin.demonstrations.buttons import Buttons
 from bubbleskin.demonstrations.pointer import Moment
 from bubbleskin.demonstrations.terrain import Patch, Terrain
 from bubbleskin.plot.terminal import from_above, shade
@@ -49,3 +50,9 @@ def _colours(terrain: Terrain) -> list[list[str]]:
     across = np.linspace(0, relief.shape[1] - 1, _COLUMNS).round().astype(int)
     limits = terrain.low_mm, terrain.high_mm
     return [[shade(height, limits) for height in row] for row in relief[np.ix_(down, across)]]
+
+
+def draw_buttons(buttons: Buttons, said: str) -> RenderableType:
+    """The bubbles from above, the one under the pointer underlined, and a line beneath."""
+    limits = buttons.rest_mm, buttons.raised_mm
+    return Group(from_above(buttons.layout, buttons.heights_mm, limits, marked=buttons.hovered), Text(said))

@@ -44,16 +44,22 @@ def pulse(
     rise: float = 0.8,
     each: float = 0.25,
     rest: float = 0.4,
+    rate_hz: float | None = None,
     loops: int = 3,
 ) -> Sequence:
     """The paper's pulse: the inner bubbles inflate together, then the framing ring one after the other; and back.
 
     The skin oscillates between its inner bubbles and its outermost ring at their greatest height. `rise`: seconds in
-    which several bubbles move together. `each`: of one bubble of the ring. `rest`: at either end.
+    which several bubbles move together. `each`: of one bubble of the ring. `rest`: at either end. `rate_hz`: how often a
+    second all of it comes; it makes the three times longer or shorter alike.
     """
     *inner, outer = rings(layout)
     inside = np.concatenate(inner) if inner else outer
     low, high = _heights(layout, low_mm, high_mm)
+    if rate_hz is not None:
+        times = np.array([number("rise", rise, 0.0), number("each", each, 0.0), number("rest", rest, 0.0)])
+        once = above_zero("The pulse's time", times @ (2, len(outer), 2), unit="s")
+        rise, each, rest = (times / (above_zero("rate_hz", rate_hz, unit="Hz") * once)).tolist()
     shape = low.copy()
     shape[inside] = high[inside]
     steps = [Step(shape, rise, "smooth", After(rest), "inner bubbles together")]
