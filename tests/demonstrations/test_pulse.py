@@ -50,6 +50,7 @@ def test_no_line_is_no_pulse(skin):
     assert skin.simulated.height_mm.max() < 5.1
 
 
+@pytest.mark.medium
 def test_the_command_pulses_per_line(command, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO("a mail\n"))
     status, out, err = command(

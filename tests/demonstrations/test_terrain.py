@@ -190,6 +190,7 @@ def test_the_wristband_follows_a_pointer(skin):
     assert np.sqrt(np.mean(np.square(off))) < 0.1
 
 
+@pytest.mark.medium
 def test_the_command_feels_a_terrain(command, tmp_path):
     status, out, err = command("demo", "terrain", "islands", "--seconds", "0.5", "--device", "sim://wristband7")
     assert (status, err) == (0, "")

@@ -4,7 +4,7 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import bubbleskin as bs
@@ -131,7 +131,6 @@ def test_every_word_fits_every_layout_and_the_range(layout, name):
 
 
 @given(composed)
-@settings(max_examples=60)
 def test_the_typed_form_means_the_same(pattern):
     assert parse(repr(pattern)) == pattern
     t = np.linspace(0, 3, 7)
@@ -139,7 +138,6 @@ def test_the_typed_form_means_the_same(pattern):
 
 
 @given(composed, st.floats(0.05, 6), st.sampled_from([0.02, 0.1, 0.5]))
-@settings(max_examples=30)
 def test_a_sequence_stays_as_close_as_it_says(pattern, seconds, within):
     """Held against the sequence's own account of what it asks, in every tick."""
     sequence = pattern.sequence(SEVEN, seconds, within_mm=within)
@@ -157,6 +155,7 @@ def test_a_sequence_repeats_whole_periods_without_a_jump():
     assert bs.Sequence.from_json(sequence.to_json()) == sequence
 
 
+@pytest.mark.medium
 def test_a_wristband_plays_it():
     """The plant's true heights against the pattern at that moment."""
     with bs.connect("sim://wristband7?contact=0") as skin:
