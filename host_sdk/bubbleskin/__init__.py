@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from bubbleskin.sequence.steps import After, Repeat, Settled, Step
     from bubbleskin.shape import shapes
     from bubbleskin.skin import Skin
+    from bubbleskin.sweeps.run import sweep
     from bubbleskin.telemetry.recording import Recording
 
 # Each name is imported when it is asked for: a script that only shows heights does not wait for scipy and numba, and the
@@ -106,6 +107,7 @@ _ROOMS = {
     "plan": "planner.search",
     "preset": "membrane",
     "read_csv": "membrane",
+    "sweep": "sweeps.run",
 }
 _MODULES = {"patterns": "patterns", "sequences": "sequence.library", "shapes": "shape.shapes"}
 
@@ -164,6 +166,7 @@ __all__ = [
     "read_csv",
     "sequences",
     "shapes",
+    "sweep",
 ]
 
 if not TYPE_CHECKING:  # where a checker saw this, it would take every misspelt name for something that is found here

@@ -26,6 +26,7 @@ from bubbleskin.cli import (
     sim,
     store,
     studio,
+    sweep,
 )
 from bubbleskin.errors import BubbleskinError, InvalidInput
 
@@ -57,6 +58,7 @@ for _command in (
     *firmware.commands,
     *flash.commands,
     *hil.commands,
+    *sweep.commands,
 ):
     bubbleskin.add_command(_command)
 

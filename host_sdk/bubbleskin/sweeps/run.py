@@ -1,0 +1,114 @@
+"""A sweep runs: points go to an executor in handfuls, rows come back and are kept at once."""
+
+import os
+import time
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bubbleskin import checks
+from bubbleskin.connecting import connect
+from bubbleskin.errors import BubbleskinError
+from bubbleskin.sweeps.rows import Row, Rows, figures
+from bubbleskin.sweeps.study import Point, Study
+from bubbleskin.sweeps.tasks import task_of
+
+Progress = Callable[[int, int], None]
+"""Called with how many points are done, and how many there are."""
+
+_HANDFUL_S = 1.0
+"""At least this much work goes to a worker at once: handing over costs some milliseconds."""
+
+
+def sweep(
+    study: "Study | Mapping[str, Any] | str | os.PathLike[str]",
+    executor: Executor | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Run a study's task on each of its wristbands; one row for each, in the study's order.
+
+    `study`: a `Study`, what a file of one says as a dict, or its path. `executor`: any of `concurrent.futures`, or one that
+    does as they do, such as `distributed.Client(…).get_executor()`; None is a process for each core. `out`: a .csv or .parquet
+    file for the rows. They are kept beside it while the sweep runs: one that was interrupted goes on from there when it is
+    asked for again. A row has the point's number, what varies, what the task returned, and `error`, a sentence where it failed.
+    """
+    if not isinstance(study, Study):
+        study = Study.of(study) if isinstance(study, Mapping) else Study.load(study)
+    task_of(study.task)
+    rows = Rows(study, None if out is None else Path(out))
+    points = study.points()
+    with rows, ExitStack() as ours:
+        left = [point for point in points if point.number not in rows]
+        if progress:
+            progress(len(points) - len(left), len(points))
+        if left:
+            workers = executor or ours.enter_context(ProcessPoolExecutor(initializer=_warm))
+            for found in _results(study, left, workers):
+                rows.add(found)
+                if progress:
+                    progress(len(rows), len(points))
+        return rows.finished()
+
+
+def _results(study: Study, left: list[Point], executor: Executor) -> Iterable[list[Row]]:
+    """Rows as they come. The first point alone says how many make a handful."""
+    first = executor.submit(work, study.task, dict(study.options), left[:1])
+    try:
+        rows, seconds = first.result()
+        yield rows
+        size = max(1, min(round(_HANDFUL_S / max(seconds, 1e-3)), 64))
+        handfuls = [left[at : at + size] for at in range(1, len(left), size)]
+        futures = [executor.submit(work, study.task, dict(study.options), handful) for handful in handfuls]
+        try:
+            for future in as_completed(futures):
+                yield future.result()[0]
+        finally:
+            for future in futures:
+                future.cancel()
+    except BrokenProcessPool:
+        raise BubbleskinError(
+            "A process of the sweep was killed, perhaps for want of memory. Rows so far are kept; ask for the same again."
+        ) from None
+
+
+def work(task: str, options: Mapping[str, Any], points: list[Point]) -> tuple[list[Row], float]:
+    """What a worker does with some points: rows, and seconds for each."""
+    begin = time.perf_counter()
+    rows = [_row(task, options, point) for point in points]
+    return rows, (time.perf_counter() - begin) / len(points)
+
+
+def _row(task: str, options: Mapping[str, Any], point: Point) -> Row:
+    row: Row = {"point": point.number, **point.varied}
+    seed = point.varied["seed"]
+    try:
+        with connect(point.url) as skin:
+            found = task_of(task)(skin, np.random.default_rng(int(seed)), **options)
+        row |= {name: checks.number(f"{name} of the task {task}", value) for name, value in found.items()}
+        row["error"] = ""
+    except BubbleskinError as error:
+        row["error"] = str(error)
+    except Exception as error:  # a task of one's own; one bad wristband must not take the others' rows
+        row["error"] = f"{type(error).__name__}: {error}"
+    return row
+
+
+def _warm() -> None:
+    """A process of its own compiles nothing that is kept, and says nothing of what is."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def describe(rows: list[Row]) -> dict[str, dict[str, float]]:
+    """Median, greatest and mean of each number that the task returned."""
+    found = {}
+    for name in figures(rows):
+        values = np.array([row[name] for row in rows if isinstance(row.get(name), float)])
+        found[name] = {"mean": float(values.mean()), "median": float(np.median(values)), "most": float(values.max())}
+    return found
