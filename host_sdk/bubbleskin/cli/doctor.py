@@ -18,8 +18,8 @@ from bubbleskin.cli.options import Real, as_json, device, progress_of_parts
 from bubbleskin.connecting import connect
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.fault_guide import guide
+from bubbleskin.line_check import LONGEST_S, check_line
 from bubbleskin.link.serial import USB_IDS
-from bubbleskin.telemetry.line_check import LONGEST_S, check_line
 from bubbleskin.warm import parts
 
 if TYPE_CHECKING:
