@@ -7,8 +7,6 @@ from collections.abc import AsyncGenerator, Iterable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, NoReturn, Self, overload
 
-import numpy as np
-
 from bubble_protocol.schema import sequences, system
 from bubbleskin import checks
 from bubbleskin.device import tables as device_tables
@@ -21,8 +19,7 @@ from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
 from bubbleskin.device.trim import ROWS_MOST, Trim
 from bubbleskin.device.trim import check as check_trim
-from bubbleskin.errors import DeviceFault, InvalidInput, LinkError
-from bubbleskin.fault_guide import remedies
+from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link
@@ -32,6 +29,7 @@ from bubbleskin.sequence.model import Playable, refuse_chance
 from bubbleskin.sequence.playback import At, PlaybackReport, PlaybackStatus, Told
 from bubbleskin.sequence.player import Player
 from bubbleskin.shape.heightfield import Heights, sample
+from bubbleskin.surface.shows import Shows
 from bubbleskin.telemetry.recording import Recording
 from bubbleskin.telemetry.stream import Telemetry
 
@@ -42,20 +40,11 @@ if TYPE_CHECKING:
     from bubbleskin.membrane.table import Table
     from bubbleskin.sim.board import Simulated
 
-SETTLE = 3.0
-"""Seconds beyond `over` after which `show` gives up waiting; the valves need about half of one."""
-
-UNASKED_END = "it was stopped or vented, or its host was silent for too long; see `fault_log()`."
-"""Why a wristband without a fault does no longer what it was asked to."""
-
 OVER_MAX = 60.0
 """Seconds that a change of shape may take at most."""
 
 PINGS_MAX = 10_000
 """PINGs that one call of `synchronise` sends at most: a minute of them."""
-
-_POLL = 0.02
-"""Seconds between two looks at whether a shape has settled."""
 
 
 class AsyncSkin:
@@ -69,7 +58,9 @@ class AsyncSkin:
         self.simulated = simulated
         link.on_open = self._opened
         self._player = Player(link, info, layout)
-        self._telemetry = Telemetry(link, info)
+        touch = simulated is None or simulated.contact
+        self._shows = Shows(link, info, layout, self._player, touch=touch)
+        self._telemetry = Telemetry(link, info, self._shows.tell)
         self.clock = Clock(info.tick, link.transport.now)
         """The device's time, from the pings so far; `synchronise` sends some."""
         link.on_ping = self.clock.hear
@@ -96,71 +87,50 @@ class AsyncSkin:
     def _opened(self, reply: Message) -> None:
         """A new session: the device may have restarted, with other tables or firmware."""
         self.info = Info.of(reply)
+        self._shows.opened(self.info)
         self._telemetry.opened()
 
     @overload
     async def show(
-        self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True, *, fill: str | None = None
+        self,
+        heights_mm: Heights,
+        over: float = 0.0,
+        wait: Literal[True] = True,
+        plan: bool = True,
+        *,
+        fill: str | None = None,
     ) -> State: ...
     @overload
     async def show(
-        self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False], fill: str | None = None
+        self,
+        heights_mm: Heights,
+        over: float = 0.0,
+        *,
+        wait: Literal[False],
+        plan: bool = True,
+        fill: str | None = None,
     ) -> None: ...
     @overload
     async def show(
-        self, heights_mm: Heights, over: float, wait: Literal[False], *, fill: str | None = None
+        self, heights_mm: Heights, over: float, wait: Literal[False], plan: bool = True, *, fill: str | None = None
     ) -> None: ...
     @overload
     async def show(
-        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, plan: bool = True, *, fill: str | None = None
     ) -> State | None: ...
     async def show(
-        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, plan: bool = True, *, fill: str | None = None
     ) -> State | None:
         """See `Skin.show`."""
         heights = sample(heights_mm, self.layout, self.info.height_max_mm, fill)
         over = checks.number("over", over, 0.0, OVER_MAX, "s")
         checks.flag("wait", wait)
-        micrometres = np.rint(heights * 1000).astype(int).tolist()
-        await self.link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
-        return await self._settle(over + SETTLE) if wait else None
-
-    async def _settle(self, patience: float) -> State:
-        """The state in which every bubble has settled; `DeviceFault` if that does not come within `patience` seconds."""
-        deadline = self.link.transport.now() + patience
-        while True:
-            state = await self.state()
-            await self._check(state)
-            if state.arrived:
-                return state
-            if self.link.transport.now() >= deadline:
-                raise self._unsettled(state, patience)
-            await self.sleep(_POLL)
-
-    async def _check(self, state: State) -> None:
-        """`DeviceFault` where a bubble has a fault, or the board no longer controls heights."""
-        ill = {bubble: found for bubble, found in enumerate(state.faults) if found}
-        if ill:
-            what = "; ".join(f"bubble {bubble}: {', '.join(found)}" for bubble, found in ill.items())
-            advice = remedies(name for found in ill.values() for name in found)
-            raise DeviceFault(f"The wristband reports faults ({what}). {advice} Then `clear_faults()`.")
-        if state.mode != "active":
-            board = (await self.health()).board_faults
-            why = f"faults of the board: {', '.join(board)}. {remedies(board)}" if board else UNASKED_END
-            raise DeviceFault(f"The wristband is {state.mode} in the middle of a show: {why}")
-
-    def _unsettled(self, state: State, patience: float) -> DeviceFault:
-        late = state.unsettled
-        where = ", ".join(f"{state.height_mm[b]:.2f} instead of {state.target_mm[b]:.2f} mm" for b in late)
-        return DeviceFault(
-            f"{self.layout.names(late).capitalize()} did not settle within {patience:g} s: at {where}. "
-            "Check the supply pressure in `health()`, leaks and kinked tubes."
-        )
+        checks.flag("plan", plan)
+        return await self._shows.show(heights, over, wait, plan)
 
     async def state(self) -> State:
         """See `Skin.state`."""
-        request = "ESTIMATE" if self.info.tells_sd else "STATE"
-        return State.of(await self.link.call(request), self.info.tick)
+        return await self._shows.look()
 
     async def health(self) -> Health:
         """See `Skin.health`."""
@@ -245,10 +215,12 @@ class AsyncSkin:
 
     async def stop(self) -> None:
         """See `Skin.stop`."""
+        self._shows.unasked()
         await self.link.call("STOP")
 
     async def vent(self) -> None:
         """See `Skin.vent`."""
+        self._shows.unasked()
         await self.link.call("VENT")
 
     async def faults(self) -> dict[int, tuple[str, ...]]:

@@ -66,30 +66,49 @@ class Skin:
 
     @overload
     def show(
-        self, heights_mm: Heights, over: float = 0.0, wait: Literal[True] = True, *, fill: str | None = None
+        self,
+        heights_mm: Heights,
+        over: float = 0.0,
+        wait: Literal[True] = True,
+        plan: bool = True,
+        *,
+        fill: str | None = None,
     ) -> State: ...
     @overload
     def show(
-        self, heights_mm: Heights, over: float = 0.0, *, wait: Literal[False], fill: str | None = None
+        self,
+        heights_mm: Heights,
+        over: float = 0.0,
+        *,
+        wait: Literal[False],
+        plan: bool = True,
+        fill: str | None = None,
     ) -> None: ...
     @overload
-    def show(self, heights_mm: Heights, over: float, wait: Literal[False], *, fill: str | None = None) -> None: ...
+    def show(
+        self, heights_mm: Heights, over: float, wait: Literal[False], plan: bool = True, *, fill: str | None = None
+    ) -> None: ...
     @overload
     def show(
-        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, plan: bool = True, *, fill: str | None = None
     ) -> State | None: ...
     def show(
-        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, *, fill: str | None = None
+        self, heights_mm: Heights, over: float = 0.0, wait: bool = True, plan: bool = True, *, fill: str | None = None
     ) -> State | None:
-        """Take a shape.
+        """Take a shape: heights are the tops of the bubbles, neighbours included.
 
         `heights_mm`: one height per bubble (n,), a 2-D heightfield stretched over the layout, or f(x_mm, y_mm).
         Heights from 0 to `info.height_max_mm`; up to `info.height_rest_mm` means no pressure. `over`: seconds
         the change should take, 0 as fast as the valves can. With `wait`, returns the state once every bubble
         has settled and raises `DeviceFault` if one does not; otherwise returns None at once. `fill`: 'nearest' gives
         entries of a heightfield that are masked or nan the number of the nearest one; without it they are refused.
+
+        Where neighbours would touch, what is sent makes up for what they do, in several steps where order counts, over 0.4 s
+        at least; a shape that cannot be had, or would pass the limit, becomes the nearest that was found, and that is
+        logged. A show that does not wait and takes 0.25 s or less is one of a stream: one step, from the shape before.
+        `plan=False` sends the heights as they are, each for a bubble by itself: neighbours may then lift one above the limit.
         """
-        return run_sync(self._skin.show(heights_mm, over, wait, fill=fill))
+        return run_sync(self._skin.show(heights_mm, over, wait, plan, fill=fill))
 
     def state(self) -> State:
         """Heights, pressures, targets and status of all bubbles, now."""

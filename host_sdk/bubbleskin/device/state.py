@@ -45,15 +45,19 @@ class State:
     mode: str
     """idle, active, holding, boot, venting, faulted or stopped: see docs/safety.md."""
     height_mm: NDArray[np.float64]
-    """The firmware's estimate: each bubble by itself."""
+    """The top of each bubble above the base plane, as far as is known: what neighbours do included."""
+    alone_mm: NDArray[np.float64]
+    """The firmware's estimate: how high each bubble would be by itself, with the air that it has."""
     pressure_kpa: NDArray[np.float64]
     """Gauge, at the sensor."""
     target_mm: NDArray[np.float64]
+    """The heights asked."""
     status: tuple[str, ...]
-    """resting, moving, settled, unsure, stopped or fault. Unsure is at its target as far as is known, which is not far enough."""
+    """resting, moving, settled, unsure, missed, stopped or fault. Unsure is at its target as far as is known, which is not far
+    enough; missed has come to rest elsewhere, because neighbours hold it there or because the target cannot be had."""
     faults: tuple[tuple[str, ...], ...]
     sd_mm: NDArray[np.float64] | None = None
-    """Standard deviation of the estimate; None where the firmware is too old to know or telemetry was not asked for it."""
+    """Standard deviation of the heights; nan where nobody knows who lifts whom; None where the firmware is too old to know or telemetry was not asked for it."""
     # Only telemetry with chosen fields has these; elsewhere they are None or NaN.
     setpoint_mm: NDArray[np.float64] | None = None
     """Where the way to the target stands."""
@@ -72,8 +76,14 @@ class State:
         if len(self.height_mm) <= _LISTED:
             heights = ", ".join(f"{height:.2f}" for height in self.height_mm)
         ill = [f"bubble {bubble}: {', '.join(faults)}" for bubble, faults in enumerate(self.faults) if faults]
-        doing = "; ".join(ill) or ("settled" if self.settled else "unsure" if self.arrived else "not settled")
+        doing = "; ".join(ill) or self._doing
         return f"<State at {self.time:.3f} s: {self.mode}, {heights} mm, {doing}>"
+
+    @property
+    def _doing(self) -> str:
+        if not self.arrived:
+            return "not settled"
+        return next((worst for worst in ("missed", "unsure") if worst in self.status), "settled")
 
     @classmethod
     def of(cls, message: Message, tick: float, lost: int = 0) -> Self:
@@ -83,6 +93,7 @@ class State:
             time=message["ticks"] * tick,
             mode=mode_name(message["mode"]),
             height_mm=columns["height_um"] / 1000,
+            alone_mm=columns["height_um"] / 1000,
             pressure_kpa=columns["pressure_pa"] / 1000,
             target_mm=columns["target_um"] / 1000,
             status=tuple(status_name(status) for status in columns["status"].tolist()),
@@ -101,15 +112,15 @@ class State:
         return [
             bubble
             for bubble, status in enumerate(self.status)
-            if not (status in ("settled", "unsure") or (status == "resting" and empty[bubble]))
+            if not (status in ("settled", "unsure", "missed") or (status == "resting" and empty[bubble]))
         ]
 
     @property
     def arrived(self) -> bool:
-        """Whether every bubble is where it was asked to be, as far as is known."""
+        """Whether every bubble is where it was asked to be, as far as is known, or has missed that for good."""
         return not self.unsettled
 
     @property
     def settled(self) -> bool:
-        """Whether every bubble is where it was asked to be, and that is known well enough: none is unsure."""
-        return self.arrived and "unsure" not in self.status
+        """Whether every bubble is where it was asked to be, and that is known well enough: none is unsure or has missed it."""
+        return self.arrived and "unsure" not in self.status and "missed" not in self.status

@@ -69,7 +69,7 @@ class Link(Serviced):
         """Whether it says so when nobody holds it any more and nobody has closed it."""
         # Threads of a script take turns, and the one that keeps the link alive has its own between calls. Tasks need none.
         self.guard: Any = contextlib.nullcontext() if event_loop else threading.RLock()
-        self._event_loop = event_loop
+        self.event_loop = event_loop
         self._rtt = RttEstimator()
         self.window = SendWindow(self._rtt)
         """The requests that wait and those under way, for those who test the link."""
@@ -241,7 +241,7 @@ class Link(Serviced):
             elif is_accepted(reply):
                 self._begin(reply)
                 if self.transport.blocks and not self._keeper:
-                    self._keeper = TaskKeeper(self) if self._event_loop else ThreadKeeper(self)
+                    self._keeper = TaskKeeper(self) if self.event_loop else ThreadKeeper(self)
                 return reply
             else:
                 self._new_session()

@@ -40,6 +40,8 @@ class Simulated(ABC):
         self.name: str = self.data.NAME
         self.tick_s: float = self.data.TICK_US * 1e-6
         """Length of one control period, s."""
+        self.contact = contact
+        """Whether its bubbles push each other."""
         self.plant = make_plant(self.data, seed, spread, contact, **options)
         self.to_device = bytearray()
         """Bytes of the link that the firmware has not read yet."""

@@ -48,6 +48,7 @@ def state(message: Message, tick: float, bubbles: int, lost: int = 0) -> State:
         time=message["ticks"] * tick,
         mode=mode_name(message["mode"]),
         height_mm=thousandths.get("height", nothing),
+        alone_mm=thousandths.get("height", nothing),
         pressure_kpa=thousandths.get("pressure", nothing),
         target_mm=thousandths.get("target", nothing),
         status=tuple(status_name(number) for number in columns.get("status", np.full(bubbles, -1)).tolist()),

@@ -17,7 +17,7 @@ from bubbleskin.layout import Layout
 from bubbleskin.link.link import run_sync
 
 SUFFIXES = (".csv", ".parquet")
-_ARRAYS = ("height_mm", "pressure_kpa", "target_mm", "setpoint_mm", "fill_ms", "vent_ms")
+_ARRAYS = ("height_mm", "sd_mm", "alone_mm", "pressure_kpa", "target_mm", "setpoint_mm", "fill_ms", "vent_ms")
 _TEXTS = ("status", "faults")
 _PARTIAL = ".partial.csv"
 

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import os
-from collections.abc import AsyncGenerator, Iterable
+from collections.abc import AsyncGenerator, Callable, Iterable
 
 from bubble_protocol.schema import messages
 from bubbleskin import checks
@@ -23,9 +23,10 @@ LEAST_HZ = 0.01
 class Telemetry:
     """What `AsyncSkin` asks of telemetry."""
 
-    def __init__(self, link: Link, info: Info):
+    def __init__(self, link: Link, info: Info, tell: Callable[[State], State]):
         self._link = link
         self._info = info
+        self._tell = tell  # from what the device believes to what is told
         self._iterator = 0  # number of the newest
         self._recording: Recording | None = None
         self._wanted: tuple[str, tuple[int, ...]] | None = None  # what is subscribed to
@@ -124,8 +125,8 @@ class Telemetry:
 
     def _state_of(self, message: Message, lost: int) -> State:
         if message.id == messages.TELEMETRY:
-            return State.of(message, self._info.tick, lost)
-        return state(message, self._info.tick, self._info.bubbles, lost)
+            return self._tell(State.of(message, self._info.tick, lost))
+        return self._tell(state(message, self._info.tick, self._info.bubbles, lost))
 
     async def aclose(self) -> None:
         """Finish a recording."""

@@ -1,0 +1,182 @@
+"""From tops that are asked to heights alone that are sent: one step where one does, a plan where order counts.
+
+On one branch tops are a smooth function of the volumes, so a few Newton steps find the volumes of a shape. Whether one way
+leads there from the shape that is kept, following it says. What cannot be had becomes the nearest that was found.
+"""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.surface.limits import Limits
+
+if TYPE_CHECKING:
+    from bubbleskin.contact.held import HeldShape
+
+Array = NDArray[np.float64]
+
+SHORT_MM = 0.2
+"""A bubble that ends further from what was asked has not got it."""
+_PATHS = 40
+"""Ways that the planner may follow: shapes that can be had take it a few."""
+_SURE_MM = 0.5
+"""Shapes that differ by more with other springs and nudges are a matter of chance."""
+_GOAL_MM = 0.01
+_SAME_MM = 0.05  # two ways that end so near each other end in the same shape
+_LONGEST_MM = 1.0  # of one Newton step, of a height alone
+_ITERATIONS = 12
+_WORTH = 0.03  # an iteration that takes off less of the squared error is the last
+
+
+class Answer(NamedTuple):
+    """What to send for tops that were asked."""
+
+    steps: tuple[Array, ...]
+    """Heights alone, mm, (n,) each, one after the other."""
+    predicted_mm: Array
+    """The tops that come of it, (n,)."""
+    members: "list[HeldShape]"
+    """The kept shapes, where that leads them."""
+
+    @property
+    def chance_mm(self) -> float:
+        """By how much more a top may be elsewhere than springs that nobody has measured explain; 0: that is sure."""
+        tops = np.array([member.height_mm for member in self.members])
+        return max(float(np.abs(tops - tops[0]).max()) - _SURE_MM, 0.0)
+
+
+class Compensation:
+    """One question: tops `asked_mm`, (n,), from the shape of `members`, the likeliest first."""
+
+    def __init__(self, members: "list[HeldShape]", asked_mm: Array, limits: Limits):
+        self._members, self._limits = members, limits
+        self._asked = np.maximum(asked_mm, limits.rest_mm)
+
+    def answer(self, *, orders: bool) -> Answer:
+        """The nearest that stays within the limits; with `orders`, several steps where one does not do."""
+        best: Answer | None = None
+        for steps in self._ways(orders):
+            found = self._follow(steps)
+            if found and (best is None or self._worth(found) < self._worth(best)):
+                best = found
+            if best and self._worth(best) <= _SAME_MM:
+                return best
+        if best is None or self._worth(best) > SHORT_MM:
+            safe = self._held_back()
+            if best is None or self._worth(safe) < self._worth(best):
+                return safe
+        return best
+
+    def _ways(self, orders: bool) -> Iterator[tuple[Array, ...]]:
+        """Ways from the simplest on; the caller ends where one leads to what was asked."""
+        now = self._members[0]
+        yield (self._newton(self._asked - now.lift_mm),)
+        yield (self._newton(self._asked),)
+        planned = self._planned() if orders else None
+        if planned:
+            yield planned
+
+    def _newton(self, guess: Array) -> Array:
+        """Heights alone with which the tops are as asked, or as near as they come, on the branch where `guess` leads."""
+        shape = self._members[0].copy()
+        shape.go(self._limits.clip(guess))
+        for _ in range(_ITERATIONS):
+            missing = self._asked - shape.height_mm
+            if np.abs(missing).max() < _GOAL_MM:
+                break
+            slope = shape.slope()
+            if slope is None:
+                break
+            change = self._bounded(slope, missing, shape.alone_mm)
+            nearer = self._nearer(shape, change)
+            if nearer is None:
+                break
+            gained = 1 - self._misfit(nearer) / self._misfit(shape)
+            shape = nearer
+            if gained < _WORTH:
+                break
+        return shape.alone_mm
+
+    def _bounded(self, slope: Array, missing: Array, alone_mm: Array) -> Array:
+        """The least squares of `slope` change = `missing` within the limits: those at a bound stay there, the others go on."""
+        low = np.maximum(self._limits.rest_mm - alone_mm, -_LONGEST_MM)
+        high = np.minimum(self._limits.alone_mm - alone_mm, _LONGEST_MM)
+        change = np.zeros_like(alone_mm)
+        free = np.ones(len(alone_mm), bool)
+        while free.any():
+            rest = missing - slope[:, ~free] @ change[~free]
+            change[free] = np.linalg.lstsq(slope[:, free], rest, rcond=1e-6)[0]
+            beyond = free & ((change < low) | (change > high))
+            if not beyond.any():
+                break
+            change = change.clip(low, high)
+            free &= ~beyond
+        return change
+
+    def _nearer(self, shape: "HeldShape", change: Array) -> "HeldShape | None":
+        for share in (1.0, 0.4, 0.15):
+            trial = shape.copy()
+            trial.go(shape.alone_mm + share * change)
+            if self._misfit(trial) < self._misfit(shape):
+                return trial
+        return None
+
+    def _planned(self) -> tuple[Array, ...] | None:
+        """The planner's steps; None where it finds none soon."""
+        from bubbleskin.planner.search import plan
+
+        def count(tried: int, _: float) -> None:
+            if tried > _PATHS:
+                raise _Enough
+
+        now, limits = self._members[0], self._limits
+        try:
+            found = plan(
+                self._asked,
+                now.model.layout,
+                contact=now.model,
+                start=now.shape(),
+                limit_mm=limits.alone_mm,
+                progress=count,
+            )
+        except _Enough:
+            return None
+        return tuple(limits.clip(step.target_mm) for step in found.steps) or (now.alone_mm,)
+
+    def _follow(self, steps: tuple[Array, ...]) -> Answer | None:
+        """Where these steps lead; None where a top would pass its limit on the way, as far as anybody knows."""
+        members = [member.copy() for member in self._members]
+        for step in steps:
+            if self._limits.highest(members, step) > 0:
+                return None
+        return Answer(steps, members[0].height_mm, members)
+
+    def _held_back(self) -> Answer:
+        """As far towards the asked as the limits let it: first apart, then the largest share of the way that stays below."""
+        low = self._limits.gaps.separated(self._limits.clip(self._asked))
+        high = self._limits.clip(self._asked)
+        best = self._follow((low,))
+        share, part = 0.0, 0.5
+        while part > 0.02:
+            found = self._follow((low + (share + part) * (high - low),))
+            if found and not found.chance_mm:
+                share, best = share + part, found
+            part /= 2
+        if best is None:  # nothing stays below: what is least
+            members = [member.copy() for member in self._members]
+            self._limits.highest(members, low)
+            best = Answer((low,), members[0].height_mm, members)
+        return best
+
+    def _misfit(self, shape: "HeldShape") -> float:
+        return float(((self._asked - shape.height_mm) ** 2).sum())
+
+    def _worth(self, found: Answer) -> float:
+        """How far it is from what was asked, mm, chance included."""
+        return float(np.abs(self._asked - found.predicted_mm).max()) + found.chance_mm
+
+
+class _Enough(Exception):
+    """The planner has followed as many ways as it may."""

@@ -1,0 +1,111 @@
+"""The shape that is kept: where the bubbles stand, from all that was sent and told, because where they came from counts.
+
+Beside the likeliest wristband six others are kept, each with one spring harder or softer and with other nudges: where they
+differ, nobody knows better.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.layout import Layout
+from bubbleskin.surface.gaps import Gaps
+
+if TYPE_CHECKING:  # scipy and numba come with it, and most shapes need neither
+    from bubbleskin.contact.held import HeldShape
+
+Array = NDArray[np.float64]
+
+SPRINGS_SHARE = 0.3 / 3**0.5
+"""Standard deviation of springs that nobody has measured: they are within 30 %, and any of it is as likely."""
+KICK = 2e-5
+"""m. Random nudges of the others: barbs and volumes are off by so much."""
+STIR_MM = 0.01
+"""What a told height must change by for the shape to be followed there."""
+_DOUBTED = ("kz", "kxy", "kc")
+
+
+class KeptShape:
+    """The bubbles of one wristband. Before the first look it knows nothing: `alone_mm` is None.
+
+    `members` are the likeliest and its doubles; empty while the bubbles are apart, when each is as high as it is alone.
+    """
+
+    def __init__(self, layout: Layout, gaps: Gaps, rest_mm: float):
+        self._layout, self._rest_mm = layout, rest_mm
+        self.gaps = gaps
+        self.alone_mm: Array | None = None
+        """2R, (n,)."""
+        self.known = False
+        """Whether the way is known on which they came here, or none matters."""
+        self.members: list[HeldShape] = []
+        self._sd_of: tuple[Array, Array] | None = None  # what it was asked with, and the answer
+
+    def forget(self) -> None:
+        """Another wristband may be there, or the same after a restart."""
+        self.alone_mm, self.known, self.members = None, False, []
+
+    def go(self, alone_mm: Array) -> None:
+        """All bubbles have gone to these heights alone, (n,) mm, straight from where they were."""
+        if self.gaps.apart(alone_mm):
+            self.alone_mm, self.known, self.members = alone_mm, True, []
+            return
+        if self.alone_mm is not None and self.members and np.abs(alone_mm - self.alone_mm).max() < STIR_MM:
+            return
+        for member in self._begun():
+            member.go(alone_mm)
+        self.alone_mm = alone_mm
+        self._sd_of = None
+
+    def begun(self) -> "list[HeldShape]":
+        """Copies of all members to try a way with, (7,)."""
+        return [member.copy() for member in self._begun()]
+
+    def take(self, members: "list[HeldShape]") -> None:
+        """Be as the members of a way that has been tried are at its end."""
+        self.go(members[0].alone_mm)
+        if self.members:
+            self.members, self._sd_of = members, None
+
+    def _begun(self) -> "list[HeldShape]":
+        if not self.members:
+            flat = np.full(len(self._layout), self._rest_mm)
+            self.members = doubles(self._layout, flat if self.alone_mm is None else self.alone_mm, self._rest_mm)
+        return self.members
+
+    @property
+    def lift_mm(self) -> Array:
+        """How much higher each bubble is than alone, (n,)."""
+        return self.members[0].lift_mm if self.members else np.zeros(len(self._layout))
+
+    def sd_mm(self, alone_sd_mm: Array) -> Array:
+        """Standard deviation of the tops, (n,): of volumes known to `alone_sd_mm`, and of springs; nan where nothing is known."""
+        if not self.members:
+            return alone_sd_mm
+        if self._sd_of is None or not np.array_equal(self._sd_of[0], alone_sd_mm):
+            self._sd_of = alone_sd_mm, self._deviation(alone_sd_mm)
+        return self._sd_of[1]
+
+    def _deviation(self, alone_sd_mm: Array) -> Array:
+        slope = self.members[0].slope()
+        if slope is None:
+            slope = np.eye(len(alone_sd_mm))
+        tops = np.array([member.height_mm for member in self.members])
+        springs = ((tops[1:] - tops[0]) ** 2).sum(axis=0) / 2  # of each spring twice: harder and softer
+        sd = np.sqrt(slope**2 @ alone_sd_mm**2 + springs)
+        if not self.known and self.alone_mm is not None:
+            sd[self.gaps.touching(self.alone_mm) | (np.abs(self.lift_mm) > STIR_MM)] = np.nan
+        return np.asarray(sd)
+
+
+def doubles(layout: Layout, alone_mm: Array, rest_mm: float) -> "list[HeldShape]":
+    """The likeliest, then two for each spring: harder, softer. No two bubbles touch at `alone_mm`, (n,)."""
+    from bubbleskin.contact.held import PRESET, HeldShape, held_model
+
+    made = [HeldShape(held_model(layout, PRESET, rest_mm), alone_mm)]
+    for name in _DOUBTED:
+        for share in (1 + SPRINGS_SHARE, 1 - SPRINGS_SHARE):
+            springs = PRESET._replace(**{name: share * getattr(PRESET, name)})
+            made.append(HeldShape(held_model(layout, springs, rest_mm), alone_mm, kick=KICK, seed=len(made)))
+    return made

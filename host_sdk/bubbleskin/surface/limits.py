@@ -1,0 +1,48 @@
+"""What no top may pass, as far as anybody can know: the board's greatest height, neighbours included, on every moment of a way."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.surface.gaps import Gaps
+
+if TYPE_CHECKING:
+    from bubbleskin.contact.held import HeldShape
+
+Array = NDArray[np.float64]
+
+_LOOKS_MM = 0.5
+"""Between two looks at the tops, no height alone has changed by more."""
+DOUBT_MM = 0.3
+"""By how much a top may pass the limit on a wristband whose springs are not the likeliest."""
+_LIFTED_MM = 0.02
+"""A bubble that is lifted by less is as high as it is alone, which the device bounds."""
+
+
+class Limits:
+    """Of a board: `rest_mm` and `alone_mm` are what a bubble may have alone."""
+
+    def __init__(self, gaps: Gaps, rest_mm: float, alone_mm: float):
+        self.gaps, self.rest_mm, self.alone_mm = gaps, rest_mm, alone_mm
+
+    def clip(self, alone_mm: Array) -> Array:
+        """Heights alone within what a bubble may have, (n,)."""
+        return np.clip(alone_mm, self.rest_mm, self.alone_mm)
+
+    def highest(self, members: "list[HeldShape]", alone_mm: Array) -> float:
+        """Lead all `members` to `alone_mm`; by how much (mm) a lifted bubble of any of them passes the limit on the way, or 0.
+
+        A top that is above the limit to begin with may come down.
+        """
+        beyond = 0.0
+        for number, member in enumerate(members):
+            limit = self.alone_mm + (DOUBT_MM if number else 0.0)
+            begin, top = member.alone_mm, member.height_mm
+            parts = max(1, int(np.ceil(np.abs(alone_mm - begin).max() / _LOOKS_MM)))
+            for part in range(1, parts + 1):
+                member.go(begin + part / parts * (alone_mm - begin))
+                before, top = top, member.height_mm
+                above = np.where(member.lift_mm > _LIFTED_MM, top - limit, 0.0)
+                beyond = max(beyond, float(np.where(top > before + _LIFTED_MM, above, 0.0).max()))
+        return max(beyond, 0.0)

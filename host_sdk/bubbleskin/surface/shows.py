@@ -1,0 +1,235 @@
+"""What `AsyncSkin` asks of shapes: tops in, SHOWs out; states in, tops out; and waiting until a shape stands."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.device.health import Health
+from bubbleskin.device.info import Info
+from bubbleskin.device.state import State
+from bubbleskin.errors import DeviceFault
+from bubbleskin.fault_guide import remedies
+from bubbleskin.layout import Layout
+from bubbleskin.link.link import Link
+from bubbleskin.sequence.model import Sequence
+from bubbleskin.sequence.player import Player
+from bubbleskin.sequence.steps import Settled, Step
+from bubbleskin.surface.compensate import SHORT_MM, Answer, Compensation
+from bubbleskin.surface.gaps import Gaps
+from bubbleskin.surface.kept import KeptShape
+from bubbleskin.surface.limits import Limits
+from bubbleskin.surface.told import told
+
+if TYPE_CHECKING:
+    from bubbleskin.contact.held import HeldShape
+
+Array = NDArray[np.float64]
+_T = TypeVar("_T")
+_log = logging.getLogger(__name__)
+
+SETTLE = 3.0
+"""Seconds beyond `over` after which `show` gives up waiting; the valves need about half of one."""
+
+UNASKED_END = "it was stopped or vented, or its host was silent for too long; see `fault_log()`."
+"""Why a wristband without a fault does no longer what it was asked to."""
+
+STREAM_S = 0.25
+"""A show that does not wait, and takes no longer than that, is one of a stream: one step, from the shape before."""
+RAMP_S = 0.4
+"""Bubbles that touch take so long at least, so that they stay on their way together: it decides where they end."""
+_STEP = Settled(tolerance_mm=0.2, timeout_s=3.0)
+_SAME_MM = 5e-4
+"""Heights are sent in whole µm."""
+_POLL = 0.02
+"""Seconds between two looks at whether a shape has settled."""
+_QUIET = 1.0
+"""Seconds between two sentences of a stream about what cannot be had."""
+
+
+class _Leg(NamedTuple):
+    """A step that was sent last: heights alone from and to, where it leads, when it was sent (host's time), how long it takes."""
+
+    begin: Array
+    end: Array
+    members: "list[HeldShape]"
+    sent: float
+    over: float
+
+
+class Shows:
+    """The shape of the device at the other end of `link`. `touch`: whether neighbours push each other, as they do but in tests."""
+
+    def __init__(self, link: Link, info: Info, layout: Layout, player: Player, *, touch: bool):
+        self._link, self._info, self._layout, self._player = link, info, layout, player
+        gaps = Gaps(layout, info.height_max_mm if touch else 0.0)
+        self._limits = Limits(gaps, info.height_rest_mm, info.height_max_mm)
+        self._kept = KeptShape(layout, gaps, info.height_rest_mm)
+        self._steps: list[Array] = []  # heights alone that were sent and are not passed, the last included
+        self._asked: Array | None = None  # the tops that they are to give; None: nobody asked for tops
+        self._leg: _Leg | None = None
+        self._said = -np.inf  # when a stream was last said to be short
+
+    def opened(self, info: Info) -> None:
+        """A session has been opened: with another boot, what was kept is of the past."""
+        if info.boot_id != self._info.boot_id:
+            self._kept.forget()
+            self.unasked()
+        self._info = info
+
+    def unasked(self) -> None:
+        """The bubbles will go where no show has asked them to."""
+        self._steps, self._asked, self._leg = [], None, None
+
+    async def show(self, heights_mm: Array, over: float, wait: bool, plan: bool) -> State | None:
+        """See `Skin.show`; `heights_mm` is (n,), checked."""
+        gaps = self._limits.gaps
+        alone = np.rint(heights_mm * 1000) / 1000
+        if not plan or gaps.apart(np.maximum(alone, self._limits.rest_mm)):
+            self._note([alone], None)
+            await self._send(alone, over)
+            return await self.settle(over + SETTLE) if wait else None
+        streams = not wait and 0 < over <= STREAM_S and self._kept.known and self._leg is not None
+        if streams:
+            self._catch_up()
+        else:
+            await self.look()
+        begin, steps = self._kept.begun(), []
+        if not self._kept.known:
+            begin, steps = self._begin_afresh()
+        question = Compensation(begin, alone, self._limits)
+        answer = await self._thought(lambda: question.answer(orders=not streams))
+        self._say_short(alone, answer, streams)
+        steps += [np.rint(step * 1000) / 1000 for step in answer.steps]
+        return await self._go(alone, steps, answer, over if streams else max(over, RAMP_S), wait)
+
+    async def _go(self, asked: Array, steps: list[Array], answer: Answer, over: float, wait: bool) -> State | None:
+        """Send these steps, `over` s for all of them."""
+        now, begin = self._link.transport.now(), self._kept.alone_mm
+        self._note(steps, asked)
+        if len(steps) == 1:
+            await self._send(steps[0], over)
+            if begin is not None:
+                self._leg = _Leg(begin, steps[0], answer.members, now, over)
+        else:
+            ramp = max(over / len(steps), RAMP_S)
+            sequence = Sequence([Step(step.tolist(), ramp, until=_STEP) for step in steps], name="show")
+            started = await self._player.start(sequence, None, follow=wait)
+            if wait:
+                await self._player.follow(started, None)
+        return await self.settle(over + SETTLE) if wait else None
+
+    async def _send(self, alone: Array, over: float) -> None:
+        micrometres = np.rint(alone * 1000).astype(int).tolist()
+        await self._link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
+
+    def _note(self, steps: list[Array], asked: Array | None) -> None:
+        self._steps, self._asked, self._leg = list(steps), asked, None
+
+    def _catch_up(self) -> None:
+        """Take the leg that was sent last for gone, as far as its time has passed."""
+        leg = self._leg
+        if leg is None:
+            return
+        share = min((self._link.transport.now() - leg.sent) / leg.over, 1.0) if leg.over else 1.0
+        if share == 1.0 and self._kept.alone_mm is leg.begin:
+            self._kept.take(leg.members)
+        else:
+            self._kept.go(leg.begin + share * (leg.end - leg.begin))
+
+    def _begin_afresh(self) -> "tuple[list[HeldShape], list[Array]]":
+        """Nobody knows on which way the bubbles came: they go apart first."""
+        where = self._kept.alone_mm
+        assert where is not None
+        apart = self._limits.gaps.separated(where)
+        _log.warning(
+            "The bubbles stood so that they may touch before this program came, and nobody knows who pushes whom: they go apart first."
+        )
+        fresh = KeptShape(self._layout, self._limits.gaps, self._limits.rest_mm)
+        fresh.go(apart)
+        return fresh.begun(), [np.rint(apart * 1000) / 1000]
+
+    async def _thought(self, think: Callable[[], _T]) -> _T:
+        """What `think` comes to; an event loop goes on meanwhile."""
+        return await asyncio.to_thread(think) if self._link.event_loop else think()
+
+    def _say_short(self, asked: Array, answer: Answer, streams: bool) -> None:
+        off = answer.predicted_mm - np.maximum(asked, self._limits.rest_mm)
+        short = np.flatnonzero(np.abs(off) > SHORT_MM)
+        now = self._link.transport.now()
+        if not len(short) or (streams and now < self._said + _QUIET):
+            return
+        self._said = now
+        most = int(np.abs(off).argmax())
+        one = len(short) == 1
+        _log.warning(
+            "%s cannot have the height%s asked: %s",
+            self._layout.names(short.tolist()).capitalize(),
+            "" if one else "s",
+            f"neighbours would lift {'it' if one else 'them'}, push {'it' if one else 'them'} aside or past the limit of "
+            f"{self._info.height_max_mm:g} mm. The nearest found is shown, bubble {most} "
+            f"{answer.predicted_mm[most]:.2f} instead of {asked[most]:.2f} mm high.",
+        )
+
+    def tell(self, state: State) -> State:
+        """The state of tops, of what a device believes of each bubble by itself."""
+        if not self._limits.gaps or np.isnan(state.alone_mm).any():
+            return state
+        ours = self._pass_steps(state.target_mm)
+        self._kept.go(state.alone_mm)
+        asked = self._asked if ours and self._asked is not None else None
+        if asked is None and not self._kept.members:
+            return state
+        on_the_way = asked is not None and len(self._steps) > 1
+        return told(state, self._kept, state.target_mm if asked is None else asked, on_the_way=on_the_way)
+
+    def _pass_steps(self, target_mm: Array) -> bool:
+        """Follow the steps before the one whose target this is; False where it is none of them."""
+        for number, step in enumerate(self._steps):
+            if np.abs(step - target_mm).max() < _SAME_MM:
+                for passed in self._steps[:number]:
+                    self._kept.go(passed)
+                self._steps = self._steps[number:]
+                return True
+        return False
+
+    async def look(self) -> State:
+        """See `Skin.state`."""
+        request = "ESTIMATE" if self._info.tells_sd else "STATE"
+        return self.tell(State.of(await self._link.call(request), self._info.tick))
+
+    async def settle(self, patience: float) -> State:
+        """The state in which every bubble has settled; `DeviceFault` if that does not come within `patience` seconds."""
+        link = self._link
+        deadline = link.transport.now() + patience
+        while True:
+            state = await self.look()
+            await self._check(state)
+            if state.arrived:
+                return state
+            if link.transport.now() >= deadline:
+                raise self._unsettled(state, patience)
+            await link.wait(link.transport.now() + _POLL)
+
+    async def _check(self, state: State) -> None:
+        """`DeviceFault` where a bubble has a fault, or the board no longer controls heights."""
+        ill = {bubble: found for bubble, found in enumerate(state.faults) if found}
+        if ill:
+            what = "; ".join(f"bubble {bubble}: {', '.join(found)}" for bubble, found in ill.items())
+            advice = remedies(name for found in ill.values() for name in found)
+            raise DeviceFault(f"The wristband reports faults ({what}). {advice} Then `clear_faults()`.")
+        if state.mode != "active":
+            board = Health.of(await self._link.call("INFO"), self._info.tick).board_faults
+            why = f"faults of the board: {', '.join(board)}. {remedies(board)}" if board else UNASKED_END
+            raise DeviceFault(f"The wristband is {state.mode} in the middle of a show: {why}")
+
+    def _unsettled(self, state: State, patience: float) -> DeviceFault:
+        late = state.unsettled
+        where = ", ".join(f"{state.height_mm[b]:.2f} instead of {state.target_mm[b]:.2f} mm" for b in late)
+        return DeviceFault(
+            f"{self._layout.names(late).capitalize()} did not settle within {patience:g} s: at {where}. "
+            "Check the supply pressure in `health()`, leaks and kinked tubes."
+        )
