@@ -183,7 +183,7 @@ def watch(skin: bs.Skin) -> Callable[[float], Trace]:
         with contextlib.closing(skin.telemetry(min(50, 1 / skin.info.tick))) as states:
             for state in states:
                 times.append(state.time - begin)
-                heights.append(state.height_mm)
+                heights.append(state.alone_mm)
                 if times[-1] >= seconds:
                     return Trace(np.array(times), np.array(heights), None)
         raise AssertionError("telemetry has ended")

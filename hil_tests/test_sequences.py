@@ -73,7 +73,7 @@ def test_the_device_follows_the_ramp(skin):
             asked = sequence.targets_at(state.time - begun)
             assert np.abs(skin.simulated.alone_mm - asked).max() < 1.0, "on its way"
     skin.sleep(0.4)
-    assert skin.state().height_mm == pytest.approx(shape(skin, 12.0), abs=0.2)
+    assert skin.state().alone_mm == pytest.approx(shape(skin, 12.0), abs=0.2)
 
 
 def test_a_condition_that_never_comes_ends_by_its_timeout(skin):
@@ -110,7 +110,7 @@ def test_a_condition_that_comes(skin):
     played = skin.play(bs.Sequence([bs.Step(shape(skin, 10.0), 0.1, until=bs.Settled(0.2, 5.0, "vent"))]))
     assert played.timeouts == ()
     assert 0.1 <= played.ended - played.began[0] < 2.0
-    assert np.abs(skin.state().height_mm - 10.0).max() <= 0.2
+    assert np.abs(skin.state().alone_mm - 10.0).max() <= 0.2
 
 
 @pytest.mark.long
@@ -122,15 +122,15 @@ def test_pause_and_resume(skin):
     skin.sleep(0.4)
     playing = skin.playing()
     assert (playing.state, playing.step) == ("paused", 0)
-    held = skin.state().height_mm
+    held = skin.state().alone_mm
     assert (held < 11.5).all()
     assert (held > 6.0).all()
     skin.sleep(0.2)
-    assert np.abs(skin.state().height_mm - held).max() < 0.3
+    assert np.abs(skin.state().alone_mm - held).max() < 0.3
     skin.resume()
     skin.sleep(0.6)
     assert skin.playing().reason == "complete"
-    assert np.abs(skin.state().height_mm - 12.0).max() <= 0.2
+    assert np.abs(skin.state().alone_mm - 12.0).max() <= 0.2
 
 
 @pytest.mark.long

@@ -12,7 +12,7 @@ NO_PRESSURE_KPA = 0.4  # sensor noise is 50 Pa
 @pytest.mark.long
 def test_vent_empties_every_bubble_within_a_second(skin):
     n = skin.info.bubbles
-    skin.show(np.full(n, 12.5))
+    skin.show(np.full(n, 12.5), plan=False)
     skin.vent()
     skin.sleep(1.0)
     for _ in range(20):
@@ -31,7 +31,7 @@ def test_vent_empties_every_bubble_within_a_second(skin):
 )
 def test_vent_ends_a_show_that_is_under_way(skin, after):
     n = skin.info.bubbles
-    skin.show(np.full(n, 12.0), wait=False)
+    skin.show(np.full(n, 12.0), wait=False, plan=False)
     skin.sleep(after)
     skin.vent()
     skin.sleep(1.0)
@@ -43,7 +43,7 @@ def test_vent_ends_a_show_that_is_under_way(skin, after):
 @pytest.mark.long
 def test_vent_ends_a_ramp(skin):
     n = skin.info.bubbles
-    skin.show(np.full(n, 12.0), over=5.0, wait=False)
+    skin.show(np.full(n, 12.0), over=5.0, wait=False, plan=False)
     skin.sleep(2.0)
     skin.vent()
     skin.sleep(4.0)
@@ -56,7 +56,7 @@ def test_vent_ends_a_ramp(skin):
 def test_stop_keeps_the_air(skin, watch):
     n = skin.info.bubbles
     shape = np.linspace(9.0, 12.5, n)
-    skin.show(shape)
+    skin.show(shape, plan=False)
     skin.stop()
     seen = watch(5.0)
     assert np.abs(seen.height_mm - shape).max() <= 0.25
@@ -71,7 +71,7 @@ def test_stop_keeps_the_air(skin, watch):
 @pytest.mark.long
 def test_stop_in_the_middle_of_a_move(skin, watch):
     n = skin.info.bubbles
-    skin.show(np.full(n, 12.5), over=2.0, wait=False)
+    skin.show(np.full(n, 12.5), over=2.0, wait=False, plan=False)
     skin.sleep(1.5)
     skin.stop()
     held = watch(3.0).since(0.2)
@@ -81,13 +81,13 @@ def test_stop_in_the_middle_of_a_move(skin, watch):
     if held.pulses is not None:
         assert not held.pulses.any()
     state = skin.state()
-    assert state.target_mm == pytest.approx(state.height_mm, abs=0.2), "where they are is where they are wanted"
+    assert state.target_mm == pytest.approx(state.alone_mm, abs=0.2), "where they are is where they are wanted"
 
 
 @pytest.mark.long
 def test_stop_while_vented_keeps_what_is_there(skin, watch):
     n = skin.info.bubbles
-    skin.show(np.full(n, 12.5))
+    skin.show(np.full(n, 12.5), plan=False)
     skin.vent()
     skin.sleep(0.1)
     skin.stop()
@@ -101,10 +101,10 @@ def test_stop_while_vented_keeps_what_is_there(skin, watch):
 def test_a_show_goes_on_afterwards(skin, watch, interruption):
     n = skin.info.bubbles
     target = np.linspace(9.0, 12.5, n)
-    skin.show(target[::-1])
+    skin.show(target[::-1], plan=False)
     getattr(skin, interruption)()
     skin.sleep(0.3)
-    assert np.abs(skin.show(target).height_mm - target).max() <= 0.2
+    assert np.abs(skin.show(target, plan=False).alone_mm - target).max() <= 0.2
     assert np.abs(watch(3.0).since(0.6).height_mm - target).max() <= 0.2
 
 

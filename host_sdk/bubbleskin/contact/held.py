@@ -44,14 +44,24 @@ class HeldShape:
     """Where the bubbles of a layout stand while their volumes change; it has a memory: the path decides.
 
     Heights are mm: `alone_mm` is 2R of each bubble, (n,), `height_mm` its top above the base plane. A new one stands on its
-    barbs with `alone_mm`, of which no two may touch. `kick` (m) and `seed` are those of the random nudges.
+    barbs with `alone_mm`, of which no two may touch. `kick` (m) and `seed` are those of the random nudges. Its bubbles are truly
+    wider than it is told by `offset_mm`, (n,).
     """
 
-    def __init__(self, model: CompliantContact, alone_mm: Array, *, kick: float | None = None, seed: int | None = None):
+    def __init__(
+        self,
+        model: CompliantContact,
+        alone_mm: Array,
+        *,
+        kick: float | None = None,
+        seed: int | None = None,
+        offset_mm: Array | float = 0.0,
+    ):
         self.model = model
         self._kick = model.kick if kick is None else kick
         self._seed = model.seed if seed is None else seed
-        self._alone_mm = np.maximum(alone_mm, 2e3 * model.bubbles["outer"])
+        self.offset_mm = offset_mm
+        self._alone_mm = self._true(alone_mm)
         radius = self._alone_mm / 2e3
         self._state = np.column_stack([model.bubbles["x"], model.bubbles["y"], radius, radius])
 
@@ -61,10 +71,13 @@ class HeldShape:
         made.__dict__.update(self.__dict__)
         return made
 
+    def _true(self, alone_mm: Array) -> Array:
+        return np.maximum(alone_mm + self.offset_mm, 2e3 * self.model.bubbles["outer"])
+
     @property
     def alone_mm(self) -> Array:
-        """2R, (n,)."""
-        return self._alone_mm
+        """2R, (n,), as told."""
+        return self._alone_mm - self.offset_mm
 
     @property
     def height_mm(self) -> Array:
@@ -78,7 +91,7 @@ class HeldShape:
 
     def go(self, alone_mm: Array) -> None:
         """Let all heights alone change in proportion to `alone_mm`, (n,), slowly: every moment of it is an equilibrium."""
-        alone_mm = np.maximum(alone_mm, 2e3 * self.model.bubbles["outer"])
+        alone_mm = self._true(alone_mm)
         way = float(np.abs(alone_mm - self._alone_mm).max())
         increments = max(1, int(np.ceil(way / _FINEST_MM)))
         follower = PathFollower(

@@ -57,7 +57,8 @@ class State:
     enough; missed has come to rest elsewhere, because neighbours hold it there or because the target cannot be had."""
     faults: tuple[tuple[str, ...], ...]
     sd_mm: NDArray[np.float64] | None = None
-    """Standard deviation of the heights; nan where nobody knows who lifts whom; None where the firmware is too old to know or telemetry was not asked for it."""
+    """Standard deviation of the heights; nan where nobody knows who lifts whom. None where the firmware is too old to know or
+    telemetry was not asked for it."""
     # Only telemetry with chosen fields has these; elsewhere they are None or NaN.
     setpoint_mm: NDArray[np.float64] | None = None
     """Where the way to the target stands."""

@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 SPRINGS_SHARE = 0.3 / 3**0.5
 """Standard deviation of springs that nobody has measured: they are within 30 %, and any of it is as likely."""
 KICK = 2e-5
-"""m. Random nudges of the others: barbs and volumes are off by so much."""
+"""m. Random nudges of the others: barbs are off by so much."""
+VOLUMES_MM = 0.05
+"""Standard deviation of heights alone: what a device that was calibrated believes is off by so much at least."""
 STIR_MM = 0.01
 """What a told height must change by for the shape to be followed there."""
 _DOUBTED = ("kz", "kxy", "kc")
@@ -62,11 +64,18 @@ class KeptShape:
         """Copies of all members to try a way with, (7,)."""
         return [member.copy() for member in self._begun()]
 
+    def copy(self) -> "KeptShape":
+        """Another that stands the same."""
+        made = KeptShape(self._layout, self.gaps, self._rest_mm)
+        made.alone_mm, made.known = self.alone_mm, self.known
+        made.members = [member.copy() for member in self.members]
+        return made
+
     def take(self, members: "list[HeldShape]") -> None:
         """Be as the members of a way that has been tried are at its end."""
-        self.go(members[0].alone_mm)
-        if self.members:
-            self.members, self._sd_of = members, None
+        self.alone_mm, self._sd_of = members[0].alone_mm, None
+        apart = self.gaps.apart(self.alone_mm)
+        self.known, self.members = self.known or apart, [] if apart else members
 
     def _begun(self) -> "list[HeldShape]":
         if not self.members:
@@ -92,7 +101,9 @@ class KeptShape:
         if slope is None:
             slope = np.eye(len(alone_sd_mm))
         tops = np.array([member.height_mm for member in self.members])
-        springs = ((tops[1:] - tops[0]) ** 2).sum(axis=0) / 2  # of each spring twice: harder and softer
+        offsets = np.array([member.offset_mm for member in self.members[1:]])
+        # Of each spring twice, harder and softer. What their volumes do is in the other term.
+        springs = ((tops[1:] - tops[0] - offsets @ slope.T) ** 2).sum(axis=0) / 2
         sd = np.sqrt(slope**2 @ alone_sd_mm**2 + springs)
         if not self.known and self.alone_mm is not None:
             sd[self.gaps.touching(self.alone_mm) | (np.abs(self.lift_mm) > STIR_MM)] = np.nan
@@ -107,5 +118,8 @@ def doubles(layout: Layout, alone_mm: Array, rest_mm: float) -> "list[HeldShape]
     for name in _DOUBTED:
         for share in (1 + SPRINGS_SHARE, 1 - SPRINGS_SHARE):
             springs = PRESET._replace(**{name: share * getattr(PRESET, name)})
-            made.append(HeldShape(held_model(layout, springs, rest_mm), alone_mm, kick=KICK, seed=len(made)))
+            number = len(made)
+            offset = np.random.default_rng(number).normal(0.0, VOLUMES_MM, len(layout))
+            model = held_model(layout, springs, rest_mm)
+            made.append(HeldShape(model, alone_mm, kick=KICK, seed=number, offset_mm=offset))
     return made

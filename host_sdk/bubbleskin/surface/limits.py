@@ -1,4 +1,4 @@
-"""What no top may pass, as far as anybody can know: the board's greatest height, neighbours included, on every moment of a way."""
+"""What no top may pass, as far as anybody can know: the board's greatest height, neighbours included, all the way."""
 
 from typing import TYPE_CHECKING
 
@@ -14,8 +14,9 @@ Array = NDArray[np.float64]
 
 _LOOKS_MM = 0.5
 """Between two looks at the tops, no height alone has changed by more."""
-DOUBT_MM = 0.3
-"""By how much a top may pass the limit on a wristband whose springs are not the likeliest."""
+DOUBT_MM = 1.0
+"""By how much a top may pass the limit where springs are not the likeliest: softer necks let bubbles rise so much further. A
+shape in which another bubble than the likeliest might be lifted passes it by more."""
 _LIFTED_MM = 0.02
 """A bubble that is lifted by less is as high as it is alone, which the device bounds."""
 
@@ -30,12 +31,11 @@ class Limits:
         """Heights alone within what a bubble may have, (n,)."""
         return np.clip(alone_mm, self.rest_mm, self.alone_mm)
 
-    def highest(self, members: "list[HeldShape]", alone_mm: Array) -> float:
-        """Lead all `members` to `alone_mm`; by how much (mm) a lifted bubble of any of them passes the limit on the way, or 0.
+    def keeps(self, members: "list[HeldShape]", alone_mm: Array) -> bool:
+        """Lead all `members` to `alone_mm`, one after another, as long as no lifted bubble passes the limit on the way.
 
         A top that is above the limit to begin with may come down.
         """
-        beyond = 0.0
         for number, member in enumerate(members):
             limit = self.alone_mm + (DOUBT_MM if number else 0.0)
             begin, top = member.alone_mm, member.height_mm
@@ -43,6 +43,6 @@ class Limits:
             for part in range(1, parts + 1):
                 member.go(begin + part / parts * (alone_mm - begin))
                 before, top = top, member.height_mm
-                above = np.where(member.lift_mm > _LIFTED_MM, top - limit, 0.0)
-                beyond = max(beyond, float(np.where(top > before + _LIFTED_MM, above, 0.0).max()))
-        return max(beyond, 0.0)
+                if ((top > limit) & (top > before + _LIFTED_MM) & (member.lift_mm > _LIFTED_MM)).any():
+                    return False
+        return True

@@ -41,9 +41,13 @@ STREAM_S = 0.25
 """A show that does not wait, and takes no longer than that, is one of a stream: one step, from the shape before."""
 RAMP_S = 0.4
 """Bubbles that touch take so long at least, so that they stay on their way together: it decides where they end."""
+_SLIDE_S = 0.15
+"""Bubbles that push each other slide on for so long once their air is there."""
 _STEP = Settled(tolerance_mm=0.2, timeout_s=3.0)
 _SAME_MM = 5e-4
 """Heights are sent in whole µm."""
+_NEAR_MM = 0.3
+"""A way is gone where all heights alone are so near its end."""
 _POLL = 0.02
 """Seconds between two looks at whether a shape has settled."""
 _QUIET = 1.0
@@ -51,17 +55,24 @@ _QUIET = 1.0
 
 
 class _Leg(NamedTuple):
-    """A step that was sent last: heights alone from and to, where it leads, when it was sent (host's time), how long it takes."""
+    """The way that was sent last: heights alone from and to, where it leads, when it was sent (host's time), its seconds."""
 
     begin: Array
     end: Array
     members: "list[HeldShape]"
     sent: float
     over: float
+    straight: bool
+    """Whether it is one step."""
+
+    def alone_at(self, time: float) -> Array:
+        """Heights alone at `time`, of a straight one."""
+        share = min((time - self.sent) / self.over, 1.0) if self.over else 1.0
+        return self.begin + share * (self.end - self.begin)
 
 
 class Shows:
-    """The shape of the device at the other end of `link`. `touch`: whether neighbours push each other, as they do but in tests."""
+    """The shape of the device at the other end of `link`. `touch`: whether neighbours push each other, as real ones do."""
 
     def __init__(self, link: Link, info: Info, layout: Layout, player: Player, *, touch: bool):
         self._link, self._info, self._layout, self._player = link, info, layout, player
@@ -70,7 +81,9 @@ class Shows:
         self._kept = KeptShape(layout, gaps, info.height_rest_mm)
         self._steps: list[Array] = []  # heights alone that were sent and are not passed, the last included
         self._asked: Array | None = None  # the tops that they are to give; None: nobody asked for tops
-        self._leg: _Leg | None = None
+        self._leg: _Leg | None = None  # of the last show, and whether its end has been seen
+        self._seen = False
+        self._looked: Array | None = None  # heights alone that were told on its way
         self._said = -np.inf  # when a stream was last said to be short
 
     def opened(self, info: Info) -> None:
@@ -92,12 +105,12 @@ class Shows:
             self._note([alone], None)
             await self._send(alone, over)
             return await self.settle(over + SETTLE) if wait else None
-        streams = not wait and 0 < over <= STREAM_S and self._kept.known and self._leg is not None
-        if streams:
-            self._catch_up()
-        else:
+        leg = self._leg
+        streams = not wait and 0 < over <= STREAM_S and self._kept.known and leg is not None and leg.straight
+        if not streams:
             await self.look()
-        begin, steps = self._kept.begun(), []
+        self._catch_up()
+        begin, steps = self._kept.begun(), list[Array]()
         if not self._kept.known:
             begin, steps = self._begin_afresh()
         question = Compensation(begin, alone, self._limits)
@@ -110,35 +123,41 @@ class Shows:
         """Send these steps, `over` s for all of them."""
         now, begin = self._link.transport.now(), self._kept.alone_mm
         self._note(steps, asked)
+        assert begin is not None
+        self._leg = _Leg(begin, steps[-1], answer.members, now, over, len(steps) == 1)
         if len(steps) == 1:
             await self._send(steps[0], over)
-            if begin is not None:
-                self._leg = _Leg(begin, steps[0], answer.members, now, over)
         else:
             ramp = max(over / len(steps), RAMP_S)
             sequence = Sequence([Step(step.tolist(), ramp, until=_STEP) for step in steps], name="show")
             started = await self._player.start(sequence, None, follow=wait)
             if wait:
                 await self._player.follow(started, None)
-        return await self.settle(over + SETTLE) if wait else None
+        if not wait:
+            return None
+        await self.settle(over + SETTLE)
+        await self._link.wait(self._link.transport.now() + _SLIDE_S)
+        return await self.settle(SETTLE)
 
     async def _send(self, alone: Array, over: float) -> None:
         micrometres = np.rint(alone * 1000).astype(int).tolist()
         await self._link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
 
     def _note(self, steps: list[Array], asked: Array | None) -> None:
-        self._steps, self._asked, self._leg = list(steps), asked, None
+        self._steps, self._asked, self._leg, self._seen = list(steps), asked, None, False
+        self._looked = None
 
     def _catch_up(self) -> None:
-        """Take the leg that was sent last for gone, as far as its time has passed."""
-        leg = self._leg
-        if leg is None:
+        """Take the way that was sent last for gone, as far as it has been seen or its time has passed."""
+        leg, now = self._leg, self._link.transport.now()
+        if leg is None or self._seen:
             return
-        share = min((self._link.transport.now() - leg.sent) / leg.over, 1.0) if leg.over else 1.0
-        if share == 1.0 and self._kept.alone_mm is leg.begin:
+        if self._looked is not None:
+            self._kept.go(self._looked)
+        elif now >= leg.sent + leg.over:
             self._kept.take(leg.members)
         else:
-            self._kept.go(leg.begin + share * (leg.end - leg.begin))
+            self._kept.go(leg.alone_at(now))
 
     def _begin_afresh(self) -> "tuple[list[HeldShape], list[Array]]":
         """Nobody knows on which way the bubbles came: they go apart first."""
@@ -146,7 +165,7 @@ class Shows:
         assert where is not None
         apart = self._limits.gaps.separated(where)
         _log.warning(
-            "The bubbles stood so that they may touch before this program came, and nobody knows who pushes whom: they go apart first."
+            "Bubbles that may touch stood there before this program came, and nobody knows who lifts whom: they go apart first."
         )
         fresh = KeptShape(self._layout, self._limits.gaps, self._limits.rest_mm)
         fresh.go(apart)
@@ -179,12 +198,29 @@ class Shows:
         if not self._limits.gaps or np.isnan(state.alone_mm).any():
             return state
         ours = self._pass_steps(state.target_mm)
-        self._kept.go(state.alone_mm)
+        kept = self._follow(state.alone_mm, ours)
         asked = self._asked if ours and self._asked is not None else None
-        if asked is None and not self._kept.members:
+        if asked is None and not kept.members:
             return state
         on_the_way = asked is not None and len(self._steps) > 1
-        return told(state, self._kept, state.target_mm if asked is None else asked, on_the_way=on_the_way)
+        return told(state, kept, state.target_mm if asked is None else asked, on_the_way=on_the_way)
+
+    def _follow(self, alone_mm: Array, ours: bool) -> KeptShape:
+        """The shape with these heights alone. On the way of a show they are told less well than they were sent: what was foreseen
+        is kept, once they are near its end."""
+        leg = self._leg
+        if leg is None or self._seen or not ours:
+            self._kept.go(alone_mm)
+            return self._kept
+        if len(self._steps) == 1 and np.abs(alone_mm - np.maximum(leg.end, self._limits.rest_mm)).max() < _NEAR_MM:
+            self._seen = True
+            self._kept.take(leg.members)
+            self._kept.go(alone_mm)
+            return self._kept
+        self._looked = alone_mm
+        on_its_way = self._kept.copy()
+        on_its_way.go(alone_mm)
+        return on_its_way
 
     def _pass_steps(self, target_mm: Array) -> bool:
         """Follow the steps before the one whose target this is; False where it is none of them."""

@@ -1,0 +1,175 @@
+"""Tops where bubbles touch: shown, told and bounded, judged by where the simulated bubbles truly stand."""
+
+import dataclasses
+import itertools
+import logging
+
+import numpy as np
+import pytest
+
+import bubbleskin as bs
+
+CROWDED = "sim://wristband7"
+LIFTED = np.array([12.5, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0])
+ORDERED = np.array([13.9, 11.88, 11.88, 11.88, 11.88, 11.88, 11.88])
+"""Only with the middle first, and then by one who knows what the others do to it."""
+
+
+@pytest.fixture
+def skin():
+    with bs.connect(CROWDED) as skin:
+        yield skin
+
+
+@pytest.mark.parametrize("asked", [LIFTED, ORDERED, np.linspace(6.0, 13.5, 7)], ids=["lifted", "ordered", "stairs"])
+def test_tops_are_where_they_were_asked(skin, asked):
+    state = skin.show(asked)
+    assert skin.simulated.height_mm == pytest.approx(asked, abs=0.15)
+    assert state.height_mm == pytest.approx(skin.simulated.height_mm, abs=0.15)
+    assert state.alone_mm == pytest.approx(skin.simulated.alone_mm, abs=0.1)
+    assert state.target_mm == pytest.approx(asked)
+
+
+def test_raw_heights_are_of_each_bubble_by_itself(skin):
+    state = skin.show(LIFTED, plan=False)
+    assert skin.simulated.alone_mm == pytest.approx(LIFTED, abs=0.1)
+    assert skin.simulated.height_mm[0] > 13.0
+    assert state.height_mm == pytest.approx(skin.simulated.height_mm, abs=0.15)
+    assert state.status[0] == "missed"
+    assert not state.settled
+    assert state.arrived
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_planned_is_nearer_than_raw(seed):
+    """Of random shapes that can be had, in a row, real rubber: planned tops are where they were asked, raw ones are not."""
+    rng = np.random.default_rng(seed)
+    with bs.connect(f"{CROWDED}?rubber=real&seed={seed}") as skin:
+        planned, raw = [], []
+        for _ in range(4):
+            skin.vent()
+            skin.sleep(1.5)
+            skin.show(rng.uniform(5.5, 12.5, 7), over=0.5, plan=False)
+            skin.sleep(1.0)
+            can_be_had = skin.simulated.height_mm.copy()
+            if can_be_had.max() > 13.5 or np.abs(can_be_had - skin.simulated.alone_mm).max() < 0.1:
+                continue
+            skin.vent()
+            skin.sleep(1.5)
+            skin.show(can_be_had)
+            skin.sleep(1.0)
+            planned.append(skin.simulated.height_mm - can_be_had)
+            skin.vent()
+            skin.sleep(1.5)
+            skin.show(can_be_had, plan=False)
+            skin.sleep(1.0)
+            raw.append(skin.simulated.height_mm - can_be_had)
+        assert len(planned) >= 1
+        assert np.sqrt(np.mean(np.square(planned))) < 0.15
+        assert np.sqrt(np.mean(np.square(raw))) > 0.25
+
+
+@pytest.mark.parametrize("asked", [np.full(7, 12.0), np.full(7, 14.0), [14.0, *[13.0] * 6]], ids=["12", "14", "peak"])
+def test_no_top_passes_the_limit_and_that_is_said(skin, asked, caplog):
+    highest = 0.0
+    with caplog.at_level(logging.WARNING, "bubbleskin"):
+        skin.show(asked, wait=False)
+    for _ in range(100):
+        skin.sleep(0.02)
+        highest = max(highest, skin.simulated.height_mm.max())
+    assert highest <= skin.info.height_max_mm
+    (said,) = caplog.messages
+    assert said.startswith("Bubbles 0, 1, 2, 3, 4, 5 and 6 cannot have the heights asked")
+    state = skin.state()
+    assert "missed" in state.status
+    assert state.target_mm == pytest.approx(np.asarray(asked))
+
+
+def test_apart_the_bytes_are_those_of_raw_heights():
+    shapes = [[6.0, 7, 8, 9, 9.5, 9, 8], [5.5] * 7, [9.8] * 7]
+    sent = []
+    for plan in (True, False):
+        with bs.connect(CROWDED) as skin:
+            write, frames = skin.link.transport.write, []
+            skin.link.transport.write = lambda data, write=write, frames=frames: (frames.append(bytes(data)), write(data))
+            for shape in shapes:
+                skin.show(shape, plan=plan)
+            sent.append(frames)
+    assert sent[0] == sent[1]
+
+
+def test_without_contact_nothing_is_made_up_for():
+    with bs.connect(f"{CROWDED}?contact=0") as skin:
+        state = skin.show(ORDERED)
+        assert skin.simulated.height_mm == pytest.approx(ORDERED, abs=0.1)
+        assert (state.height_mm == state.alone_mm).all()
+
+
+def test_telemetry_and_recordings_have_tops(skin, tmp_path):
+    skin.show(LIFTED)
+    (state,) = itertools.islice(skin.telemetry(20), 1)
+    assert state.height_mm[0] == pytest.approx(12.5, abs=0.15)
+    assert state.alone_mm[0] < 12.0
+    path = tmp_path / "tops.csv"
+    skin.record(path, seconds=0.2)
+    names, row = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")][:2]
+    said = dict(zip(names, row, strict=True))
+    assert float(said["height_mm_0"]) == pytest.approx(12.5, abs=0.15)
+    assert float(said["alone_mm_0"]) < 12.0
+    assert float(said["sd_mm_0"]) > 0
+
+
+def test_a_stream_follows_a_pointer(skin):
+    """A hill under a pointer that moves 30 times a second, so steep that its flanks lift it."""
+    x, y = skin.layout.positions_mm.T
+    skin.show([6.0] * 7)
+    errors = []
+    for frame in range(90):
+        at = 8 * np.cos(frame / 15), 8 * np.sin(frame / 10)
+        hill = 6 + 6 * np.exp(-((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2 * 8**2))
+        skin.show(hill, over=1 / 30, wait=False)
+        skin.sleep(1 / 30)
+        if frame > 15:
+            errors.append(skin.simulated.height_mm - hill)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.25
+
+
+def test_who_comes_to_an_inflated_wristband_is_not_told_what_nobody_knows(skin):
+    skin.show(ORDERED, wait=False)
+    skin.sleep(3.0)
+    from bubbleskin.async_skin import AsyncSkin
+    from bubbleskin.link.link import run_sync
+
+    other = bs.Skin(run_sync(AsyncSkin.open(skin.link.transport, 2.0, simulated=skin.simulated)))
+    state = other.state()
+    assert np.isnan(state.sd_mm).all()
+    assert set(state.status) == {"unsure"}
+    assert state.alone_mm == pytest.approx(skin.simulated.alone_mm, abs=0.1)
+    shown = other.show(LIFTED)
+    assert np.isfinite(shown.sd_mm).all()
+    assert skin.simulated.height_mm == pytest.approx(LIFTED, abs=0.2)
+
+
+def test_vent_forgets_who_lifted_whom(skin):
+    skin.show(LIFTED)
+    skin.vent()
+    skin.sleep(2.0)
+    state = skin.state()
+    assert (state.height_mm == state.alone_mm).all()
+    assert set(state.status) == {"resting"}
+
+
+@pytest.mark.parametrize("plan", [None, 1, "yes", np.True_])
+def test_plan_is_a_flag(skin, plan):
+    if isinstance(plan, np.bool_):
+        skin.show([6.0] * 7, plan=plan)
+        return
+    with pytest.raises(bs.InvalidInput, match=r"plan is .*; give True or False"):
+        skin.show([6.0] * 7, plan=plan)
+
+
+def test_a_state_of_old_firmware_has_no_deviation(skin):
+    skin.link.call  # noqa: B018
+    old = dataclasses.replace(skin.info, tells_sd=False)
+    assert not old.tells_sd
