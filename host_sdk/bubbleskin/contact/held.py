@@ -45,7 +45,7 @@ class HeldShape:
 
     Heights are mm: `alone_mm` is 2R of each bubble, (n,), `height_mm` its top above the base plane. A new one stands on its
     barbs with `alone_mm`, of which no two may touch. `kick` (m) and `seed` are those of the random nudges. Its bubbles are truly
-    wider than it is told by `offset_mm`, (n,).
+    wider than it is told by `offset_mm`, (n,), and go at `pace`, (n,), where others say how far a way has been gone.
     """
 
     def __init__(
@@ -56,14 +56,19 @@ class HeldShape:
         kick: float | None = None,
         seed: int | None = None,
         offset_mm: Array | float = 0.0,
+        pace: Array | float = 1.0,
     ):
         self.model = model
         self._kick = model.kick if kick is None else kick
         self._seed = model.seed if seed is None else seed
-        self.offset_mm = offset_mm
+        self.offset_mm, self._pace = offset_mm, pace / np.min(pace)
         self._alone_mm = self._true(alone_mm)
         radius = self._alone_mm / 2e3
         self._state = np.column_stack([model.bubbles["x"], model.bubbles["y"], radius, radius])
+
+    def shares(self, share: float) -> Array | float:
+        """How far each bubble has gone of a way of which the slowest has gone `share`, 0 to 1, (n,)."""
+        return np.minimum(share * self._pace, 1.0)
 
     def copy(self) -> Self:
         """Another that stands the same."""

@@ -23,6 +23,8 @@ KICK = 2e-5
 """m. Random nudges of the others: barbs are off by so much."""
 VOLUMES_MM = 0.05
 """Standard deviation of heights alone: what a device that was calibrated believes is off by so much at least."""
+PACE = 0.04
+"""By how much bubbles are faster and slower than asked, RMS: some arrive some ms before others."""
 STIR_MM = 0.01
 """What a told height must change by for the shape to be followed there."""
 _DOUBTED = ("kz", "kxy", "kc")
@@ -119,7 +121,15 @@ def doubles(layout: Layout, alone_mm: Array, rest_mm: float) -> "list[HeldShape]
         for share in (1 + SPRINGS_SHARE, 1 - SPRINGS_SHARE):
             springs = PRESET._replace(**{name: share * getattr(PRESET, name)})
             number = len(made)
-            offset = np.random.default_rng(number).normal(0.0, VOLUMES_MM, len(layout))
-            model = held_model(layout, springs, rest_mm)
-            made.append(HeldShape(model, alone_mm, kick=KICK, seed=number, offset_mm=offset))
+            rng = np.random.default_rng(number)
+            made.append(
+                HeldShape(
+                    held_model(layout, springs, rest_mm),
+                    alone_mm,
+                    kick=KICK,
+                    seed=number,
+                    offset_mm=rng.normal(0.0, VOLUMES_MM, len(layout)),
+                    pace=1.0 + rng.normal(0.0, PACE, len(layout)),
+                )
+            )
     return made

@@ -41,7 +41,7 @@ class Limits:
             begin, top = member.alone_mm, member.height_mm
             parts = max(1, int(np.ceil(np.abs(alone_mm - begin).max() / _LOOKS_MM)))
             for part in range(1, parts + 1):
-                member.go(begin + part / parts * (alone_mm - begin))
+                member.go(begin + member.shares(part / parts) * (alone_mm - begin))
                 before, top = top, member.height_mm
                 if ((top > limit) & (top > before + _LIFTED_MM) & (member.lift_mm > _LIFTED_MM)).any():
                     return False
