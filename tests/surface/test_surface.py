@@ -41,33 +41,35 @@ def test_raw_heights_are_of_each_bubble_by_itself(skin):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_planned_is_nearer_than_raw(seed):
-    """Of random shapes that can be had, in a row, real rubber: planned tops are where they were asked, raw ones are not."""
-    rng = np.random.default_rng(seed)
-    with bs.connect(f"{CROWDED}?rubber=real&seed={seed}") as skin:
-        planned, raw = [], []
-        for _ in range(4):
-            skin.vent()
+@pytest.mark.parametrize("rubber", ["ideal", "real"])
+def test_planned_is_nearer_than_raw(rubber):
+    """Shapes that a wristband has had: planned tops are where they were asked, raw ones are not."""
+    rng = np.random.default_rng(2)
+    off = {True: [], False: []}
+    with bs.connect(f"{CROWDED}?rubber={rubber}") as skin:
+        for _ in range(6):
+            flat(skin)
+            skin.show(rng.uniform(7.0, 12.5, 7), over=0.5, wait=False, plan=False)
             skin.sleep(1.5)
-            skin.show(rng.uniform(5.5, 12.5, 7), over=0.5, plan=False)
-            skin.sleep(1.0)
-            can_be_had = skin.simulated.height_mm.copy()
-            if can_be_had.max() > 13.5 or np.abs(can_be_had - skin.simulated.alone_mm).max() < 0.1:
+            had = skin.simulated.height_mm.copy()
+            if had.max() > 13.5 or np.abs(had - skin.simulated.alone_mm).max() < 0.3:
                 continue
-            skin.vent()
-            skin.sleep(1.5)
-            skin.show(can_be_had)
-            skin.sleep(1.0)
-            planned.append(skin.simulated.height_mm - can_be_had)
-            skin.vent()
-            skin.sleep(1.5)
-            skin.show(can_be_had, plan=False)
-            skin.sleep(1.0)
-            raw.append(skin.simulated.height_mm - can_be_had)
-        assert len(planned) >= 1
-        assert np.sqrt(np.mean(np.square(planned))) < 0.15
-        assert np.sqrt(np.mean(np.square(raw))) > 0.25
+            for plan, errors in off.items():
+                flat(skin)
+                skin.show(had, over=0.5, wait=False, plan=plan)
+                skin.sleep(3.0)
+                errors.append(skin.simulated.height_mm - had)
+    assert len(off[True]) >= 2
+    planned, raw = (np.sqrt(np.mean(np.square(off[plan]))) for plan in (True, False))
+    assert planned < 0.2
+    assert raw > 2 * planned
+
+
+def flat(skin):
+    skin.vent()
+    skin.sleep(1.5)
+    if skin.faults():
+        skin.clear_faults()
 
 
 @pytest.mark.parametrize("asked", [np.full(7, 12.0), np.full(7, 14.0), [14.0, *[13.0] * 6]], ids=["12", "14", "peak"])
@@ -80,9 +82,10 @@ def test_no_top_passes_the_limit_and_that_is_said(skin, asked, caplog):
         highest = max(highest, skin.simulated.height_mm.max())
     assert highest <= skin.info.height_max_mm
     (said,) = caplog.messages
-    assert said.startswith("Bubbles 0, 1, 2, 3, 4, 5 and 6 cannot have the heights asked")
+    assert "1, 2, 3, 4, 5 and 6 cannot have the heights asked" in said
     state = skin.state()
-    assert "missed" in state.status
+    assert not state.settled
+    assert state.arrived
     assert state.target_mm == pytest.approx(np.asarray(asked))
 
 
@@ -92,7 +95,10 @@ def test_apart_the_bytes_are_those_of_raw_heights():
     for plan in (True, False):
         with bs.connect(CROWDED) as skin:
             write, frames = skin.link.transport.write, []
-            skin.link.transport.write = lambda data, write=write, frames=frames: (frames.append(bytes(data)), write(data))
+            skin.link.transport.write = lambda data, write=write, frames=frames: (
+                frames.append(bytes(data)),
+                write(data),
+            )
             for shape in shapes:
                 skin.show(shape, plan=plan)
             sent.append(frames)
@@ -167,9 +173,3 @@ def test_plan_is_a_flag(skin, plan):
         return
     with pytest.raises(bs.InvalidInput, match=r"plan is .*; give True or False"):
         skin.show([6.0] * 7, plan=plan)
-
-
-def test_a_state_of_old_firmware_has_no_deviation(skin):
-    skin.link.call  # noqa: B018
-    old = dataclasses.replace(skin.info, tells_sd=False)
-    assert not old.tells_sd

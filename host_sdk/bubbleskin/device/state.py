@@ -61,7 +61,7 @@ class State:
     telemetry was not asked for it."""
     # Only telemetry with chosen fields has these; elsewhere they are None or NaN.
     setpoint_mm: NDArray[np.float64] | None = None
-    """Where the way to the target stands."""
+    """Where the way to the target stands, of each bubble by itself."""
     fill_ms: NDArray[np.float64] | None = None
     """For how long the fill valve is energised in this tick."""
     vent_ms: NDArray[np.float64] | None = None

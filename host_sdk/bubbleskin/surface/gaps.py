@@ -7,8 +7,8 @@ from bubbleskin.layout import Layout
 
 Array = NDArray[np.float64]
 
-MARGIN_MM = 0.1
-"""Bubbles closer than that are taken to touch: barbs and volumes are not known better."""
+SLACK_MM = 0.1
+"""Spheres that overlap by less push each other no further than heights are known."""
 
 
 class Gaps:
@@ -20,7 +20,7 @@ class Gaps:
 
     def __init__(self, layout: Layout, height_max_mm: float):
         place = layout.positions_mm
-        distance = np.linalg.norm(place[:, None] - place[None], axis=2) - MARGIN_MM
+        distance = np.linalg.norm(place[:, None] - place[None], axis=2) + SLACK_MM
         self._first, self._second = np.nonzero(np.triu(distance < height_max_mm, 1))
         self._room = 2 * distance[self._first, self._second]
         np.fill_diagonal(distance, np.inf)
@@ -44,4 +44,4 @@ class Gaps:
 
     def separated(self, alone_mm: Array) -> Array:
         """These heights, cut until no two can touch, (n,)."""
-        return np.minimum(alone_mm, self.free_mm - MARGIN_MM)
+        return np.minimum(alone_mm, self.free_mm - 2 * SLACK_MM)
