@@ -1,6 +1,5 @@
 """Tops where bubbles touch: shown, told and bounded, judged by where the simulated bubbles truly stand."""
 
-import dataclasses
 import itertools
 import logging
 

@@ -14,6 +14,7 @@ from bubbleskin.surface.gaps import Gaps
 
 if TYPE_CHECKING:  # scipy and numba come with it, and most shapes need neither
     from bubbleskin.contact.held import HeldShape
+    from bubbleskin.contact.model import CompliantContact
 
 Array = NDArray[np.float64]
 
@@ -114,22 +115,27 @@ class KeptShape:
 
 def doubles(layout: Layout, alone_mm: Array, rest_mm: float) -> "list[HeldShape]":
     """The likeliest, then two for each spring: harder, softer. No two bubbles touch at `alone_mm`, (n,)."""
-    from bubbleskin.contact.held import PRESET, HeldShape, held_model
+    from bubbleskin.contact.held import HeldShape
 
-    made = [HeldShape(held_model(layout, PRESET, rest_mm), alone_mm)]
+    likeliest, *others = _models(layout, rest_mm)
+    made = [HeldShape(likeliest, alone_mm)]
+    for number, model in enumerate(others, 1):
+        rng = np.random.default_rng(number)
+        offset = rng.normal(0.0, VOLUMES_MM, len(layout))
+        pace = 1.0 + rng.normal(0.0, PACE, len(layout))
+        made.append(HeldShape(model, alone_mm, offset_mm=offset, pace=pace))
+    return made
+
+
+def _models(layout: Layout, rest_mm: float) -> "list[CompliantContact]":
+    from bubbleskin.contact.model import CompliantContact
+    from bubbleskin.membrane import YeohBalloon
+
+    balloon = YeohBalloon(radius=rest_mm / 2e3)
+    likeliest = CompliantContact(layout, balloon)
+    models = [likeliest]
     for name in _DOUBTED:
         for share in (1 + SPRINGS_SHARE, 1 - SPRINGS_SHARE):
-            springs = PRESET._replace(**{name: share * getattr(PRESET, name)})
-            number = len(made)
-            rng = np.random.default_rng(number)
-            made.append(
-                HeldShape(
-                    held_model(layout, springs, rest_mm),
-                    alone_mm,
-                    kick=KICK,
-                    seed=number,
-                    offset_mm=rng.normal(0.0, VOLUMES_MM, len(layout)),
-                    pace=1.0 + rng.normal(0.0, PACE, len(layout)),
-                )
-            )
-    return made
+            springs = {one: getattr(likeliest, one) * (share if one == name else 1.0) for one in _DOUBTED}
+            models.append(CompliantContact(layout, balloon, **springs, kick=KICK, seed=len(models)))
+    return models
