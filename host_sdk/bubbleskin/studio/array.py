@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State
 from bubbleskin.layout import Layout
+from bubbleskin.studio.files import STATIC
 
 BubbleEvent = dict[str, Any]
 """`kind`: enter, leave, press or paint; `bubble`; `stamp`: when, in the browser, s since 1970."""
 
 
-class Array(Element, component="static/array.js"):
+class Array(Element, component=STATIC / "array.js"):
     """The bubbles of `layout`, the strip chart of the chosen one, and all figures as a table."""
 
     def __init__(self, info: Info, layout: Layout):

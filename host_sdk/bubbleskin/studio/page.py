@@ -1,5 +1,6 @@
 """One page: the bar with stop and vent, the live array, and beside it the panel that was chosen. All of it is rebuilt at will."""
 
+import re
 from collections.abc import Callable
 from typing import Protocol
 
@@ -10,8 +11,11 @@ from bubbleskin.device.state import State
 from bubbleskin.link.clock import Clock
 from bubbleskin.studio.array import Array
 from bubbleskin.studio.desk import Desk
+from bubbleskin.studio.panels.buttons import ButtonsPanel
 from bubbleskin.studio.panels.live import LivePanel, choose_device
+from bubbleskin.studio.panels.patterns import PatternPanel
 from bubbleskin.studio.panels.pulse import PulsePanel
+from bubbleskin.studio.panels.terrain import TerrainPanel
 from bubbleskin.studio.widgets import text
 
 REFRESH_S = 0.4
@@ -28,6 +32,9 @@ class Panel(Protocol):
 PANELS: dict[str, tuple[str, Callable[[Desk, Array], Panel]]] = {
     "live": ("Live", LivePanel),
     "pulse": ("Pulse", PulsePanel),
+    "terrain": ("Terrain", TerrainPanel),
+    "buttons": ("Buttons", ButtonsPanel),
+    "patterns": ("Patterns", PatternPanel),
 }
 """By the name in the address: what its tab says, and what makes it."""
 
@@ -56,8 +63,9 @@ class Page:
     def _bar(self) -> None:
         with ui.element("div").classes("bar").props('role="banner"'):
             text("h1", "bubbleskin studio")
-            self._where = text("span", "", "where")
-            self._facts = _Facts(("doing", "supply", "link", "clock", "pointer"))
+            with ui.element("div").classes("told"):
+                self._where = text("span", "", "where")
+                self._facts = _Facts(("doing", "supply", "link", "clock", "pointer"))
             with ui.element("div").classes("safety"):
                 for what, key in (("stop", "Esc"), ("vent", "Esc Esc")):
                     with ui.element("button").classes(f"btn {what}").props(f'type="button" data-act="{what}"'):
@@ -111,7 +119,7 @@ class Page:
             return
         self._notice.text = owner.problem
         self._notice.set_visibility(bool(owner.problem))
-        self._where.text = f"{owner.skin.info.board} at {owner.url}" if owner.skin else owner.url
+        self._where.text = shown(owner.url)
         self._facts.say(
             doing=_doing(owner.state, owner.activity),
             supply=f"{owner.health.supply_kpa:.0f} kPa" if owner.health else "–",
@@ -137,6 +145,11 @@ class _Facts:
         for name, (fact, value) in self._values.items():
             value.text = values.get(name, "")
             fact.set_visibility(bool(values.get(name)))
+
+
+def shown(url: str) -> str:
+    """A URL without what the studio has added to it."""
+    return re.sub(r"[?&]realtime=1$", "", url)
 
 
 def _doing(state: State | None, activity: str) -> str:

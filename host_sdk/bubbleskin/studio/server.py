@@ -6,11 +6,10 @@ import errno
 import secrets
 import socket
 from collections.abc import Callable
-from pathlib import Path
 from types import FrameType
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse
 from nicegui import ui
 from nicegui.client import Client
@@ -18,11 +17,11 @@ from starlette.staticfiles import StaticFiles
 
 from bubbleskin.errors import InvalidInput
 from bubbleskin.studio.desk import Desk
+from bubbleskin.studio.files import STATIC
 from bubbleskin.studio.guard import Guard
 from bubbleskin.studio.owner import Owner
 from bubbleskin.studio.page import Page
 
-_STATIC = Path(__file__).parent / "static"
 _LAST_WORDS_S = 2
 """Seconds that open connections have at the end."""
 
@@ -76,7 +75,7 @@ class Studio:
 
     def _application(self) -> FastAPI:
         app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-        app.mount("/studio", StaticFiles(directory=_STATIC))
+        app.mount("/studio", StaticFiles(directory=STATIC))
         owner, desk = self.owner, self.desk
 
         @app.post("/stop")
@@ -93,6 +92,10 @@ class Studio:
         async def notify() -> JSONResponse:
             return _answer(desk.notify())
 
+        @app.post("/terrain")
+        async def terrain(request: Request, name: str = "") -> JSONResponse:
+            return _answer(await desk.upload(name, await request.body()))
+
         @ui.page("/", title="bubbleskin studio")
         def page(tab: str = "live") -> None:
             ui.add_head_html(
@@ -103,7 +106,7 @@ class Studio:
         ui.run_with(
             app,
             title="bubbleskin studio",
-            favicon=_STATIC / "icon.svg",
+            favicon=STATIC / "icon.svg",
             dark=None,
             language="en-US",
             tailwind=False,

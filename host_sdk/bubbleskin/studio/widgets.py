@@ -7,6 +7,8 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.elements.mixins.text_element import TextElement
 
+from bubbleskin.studio.files import STATIC
+
 
 class Range(NamedTuple):
     """What a slider goes through, and the unit it says."""
@@ -29,7 +31,7 @@ def button(words: str, act: Callable[[], Any], classes: str = "btn") -> TextElem
     return element.on("click", lambda: act(), js_handler="() => emit()")
 
 
-class Control(Element, component="static/control.js"):
+class Control(Element, component=STATIC / "control.js"):
     """What a person sets: the browser's own slider, line of text or choice. `chosen(value)` is called with what they choose."""
 
     def __init__(self, label: str, kind: str, value: float | str, chosen: Callable[[str], None], **more: Any):
@@ -67,7 +69,7 @@ class Slider:
         self._change(value)
 
 
-def choice(label: str, options: Sequence[tuple[str, str]], value: str, change: Callable[[str], None]) -> Control:
+def choice(label: str, options: Sequence[Sequence[str]], value: str, change: Callable[[str], None]) -> Control:
     """One of several: (value, words) each."""
     with ui.element("div").classes("field"):
         text("span", label)
@@ -79,3 +81,17 @@ def field(label: str, value: str, change: Callable[[str], None], hint: str = "")
     with ui.element("div").classes("field"):
         text("span", label)
         return Control(label, "text", value, change, hint=hint)
+
+
+class Toggle:
+    """A button that is pressed or not, as `set` says; `act()` is called when somebody presses it."""
+
+    def __init__(self, words: str, act: Callable[[], Any]):
+        self._button = button(words, act)
+        self.set(False)
+
+    def set(self, pressed: bool) -> None:
+        """Look pressed, or not."""
+        said = "true" if pressed else "false"
+        if self._button.props.get("aria-pressed") != said:
+            self._button.props["aria-pressed"] = said

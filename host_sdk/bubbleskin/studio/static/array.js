@@ -230,10 +230,11 @@ export default {
       parts.group.classList.toggle("faulty", now.s[bubble] === "fault");
       parts.group.setAttribute("aria-label", this.words(bubble, now));
       parts.label.setAttribute("class", 0.3 * colour[0] + 0.6 * colour[1] + 0.1 * colour[2] < 140 ? "on-dark" : "on-light");
+      const rise = (across / 10) * Math.cos((this.elevation * Math.PI) / 180); // who stands before it hides its lower part
       for (const [node, words, down] of [[parts.name, bubble, -0.55], [parts.value, top.toFixed(1), 1.15]]) {
         node.textContent = words;
         node.setAttribute("x", cx.toFixed(2));
-        node.setAttribute("y", (cy + down).toFixed(2));
+        node.setAttribute("y", (cy - rise + down).toFixed(2));
       }
     },
     colourOf(bubble, now) {

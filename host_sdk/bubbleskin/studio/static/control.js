@@ -16,10 +16,14 @@ export default {
     });
   },
   watch: {
-    value(value) {
+    value: { handler: "take", flush: "post" },
+    options: { handler: "take", flush: "post" },
+  },
+  methods: {
+    take() {
       const rest = HAND_MS - (performance.now() - this.touched);
-      if (rest > 0) setTimeout(() => (performance.now() - this.touched >= HAND_MS ? (this.$el.value = this.value) : 0), rest);
-      else this.$el.value = value;
+      if (rest > 0) setTimeout(() => this.take(), rest);
+      else this.$el.value = this.value;
     },
   },
 };
