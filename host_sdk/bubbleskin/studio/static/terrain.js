@@ -41,13 +41,17 @@ export default {
     move(x, y, event) {
       this.at = [Math.min(Math.max(x, 0), this.size[0]), Math.min(Math.max(y, 0), this.size[1])];
       this.stamp = (performance.timeOrigin + event.timeStamp) / 1000;
-      if (this.due) return;
-      this.due = true;
-      requestAnimationFrame(() => {
-        this.due = false;
-        this.mark();
-        this.$emit("point", { x: this.at[0], y: this.at[1], stamp: this.stamp });
-      });
+      this.moved = true;
+      if (!this.due) this.tell();
+    },
+    tell() {
+      // At once where nothing was told in this frame; what comes until the next one is told with it.
+      this.due = this.moved;
+      if (!this.moved) return;
+      this.moved = false;
+      this.$emit("point", { x: this.at[0], y: this.at[1], stamp: this.stamp });
+      this.mark();
+      requestAnimationFrame(() => this.tell());
     },
     mark() {
       this.positions.forEach(([x, y], bubble) => {
