@@ -17,6 +17,7 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
 from bubbleskin.link.link import Link, run_sync
+from bubbleskin.pictured import Pictured
 from bubbleskin.sequence.model import Playable
 from bubbleskin.sequence.playback import At, PlaybackReport, PlaybackStatus, Told
 from bubbleskin.shape.heightfield import Heights
@@ -33,7 +34,7 @@ _CLOCK_AGE = 1.0
 """Seconds after which the clock wants new pings."""
 
 
-class Skin:
+class Skin(Pictured):
     """A wristband, real or simulated; made by `bubbleskin.connect`.
 
     Every method raises `LinkError` when the device cannot be reached (`DeviceSilent` when it does not answer

@@ -17,6 +17,7 @@ from bubbleskin.calibrate.sheet import Sizes, sized
 from bubbleskin.calibrate.sheet import estimate as estimate_sheet
 from bubbleskin.calibrate.verdict import Verdict
 from bubbleskin.errors import InvalidInput
+from bubbleskin.pictured import Pictured
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +60,7 @@ class BubbleCalibration:
 
 
 @dataclass(frozen=True, eq=False)
-class SelfCalibration:
+class SelfCalibration(Pictured):
     """What `calibrate` returns. `SelfCalibration.load(path)` fits the file's raw data again, with what this version knows."""
 
     board: str

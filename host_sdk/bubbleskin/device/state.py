@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from bubble_protocol.schema import modes, statuses
 from bubbleskin.device.faults import fault_names
 from bubbleskin.link.message import Message
+from bubbleskin.pictured import Pictured
 
 _MODES = {number: name for number, name, _ in modes.MODES}
 _STATUSES = {number: name for number, name, _ in statuses.STATUSES}
@@ -37,7 +38,7 @@ def bubbles_of(mask: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Pictured):
     """All bubbles at one moment; arrays have one entry per bubble, in layout order."""
 
     time: float

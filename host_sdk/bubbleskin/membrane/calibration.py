@@ -21,13 +21,14 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.files import parse_toml, read_text, write_text
 from bubbleskin.membrane.balloon import YeohBalloon
 from bubbleskin.membrane.table import MAX_KNOTS, Table, build_table
+from bubbleskin.pictured import Pictured
 
 SCHEMA = 1
 CONSTANTS = ("mu_pa", "c2_pa", "c3_pa", "thickness_m", "radius_m", "wall", "surface")
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Calibration(Pictured):
     """The tables of a board's bubbles in layout order, and ``source``, a sentence on where they come from."""
 
     board: str

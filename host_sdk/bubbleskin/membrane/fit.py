@@ -12,6 +12,7 @@ from bubbleskin.checks import Numbers, finite, like, positive
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import Surface, Wall, YeohBalloon
 from bubbleskin.membrane.regression import Dimensions, Points, Solution, regress
+from bubbleskin.pictured import Pictured
 
 HEIGHT_SD = 0.05e-3
 """Standard deviation (m) assumed of a height when none is given."""
@@ -79,7 +80,7 @@ class Repeats(NamedTuple):
 
 
 @dataclass(frozen=True)
-class YeohFit:
+class YeohFit(Pictured):
     """A fitted bubble with its uncertainty.
 
     ``parameters`` (μ, C2, C3) in Pa and their ``covariance`` (3, 3); ``residuals`` (n,) in Pa, measured

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bubbleskin.contact.shape import Shape
 from bubbleskin.layout import Layout
+from bubbleskin.pictured import Pictured
 from bubbleskin.planner.orders import Order
 from bubbleskin.sequence.model import Sequence
 from bubbleskin.sequence.steps import Settled, Step
@@ -40,7 +41,7 @@ class PlanStep:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Pictured):
     """How to get a shape, and what comes of it."""
 
     layout: Layout

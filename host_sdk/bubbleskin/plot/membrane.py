@@ -71,7 +71,7 @@ def plot_fit(fit: YeohFit | SheetFit, measurements: Measurements, *, title: str 
         figure, axes = _figure()
         top = float(measurements.height.max()) * 1e3 + 0.5
         if isinstance(fit, YeohFit):
-            _draw_band(axes, fit, top)
+            draw_band(axes, fit, top)
             draw_curve(axes, fit.balloon, up_to_mm=top, colour=COLOURS[0], label="model, fitted")
             _draw_points(axes, fit, measurements, colour="#222222", marker="o", label="measured")
             _draw_plateau(axes, fit, measurements)
@@ -202,7 +202,7 @@ def _draw_plateau(axes: Axes, fit: YeohFit, measurements: Measurements) -> None:
     if not np.any((low < measurements.height) & (measurements.height < high)):
         return
     inset = axes.inset_axes((0.12, 0.29, 0.42, 0.4))
-    _draw_band(inset, fit, high * 1e3)
+    draw_band(inset, fit, high * 1e3)
     draw_curve(inset, fit.balloon, up_to_mm=high * 1e3, colour=COLOURS[0])
     _draw_points(inset, fit, measurements, colour="#222222", marker="o", label="")
     ends = fit.balloon.pressure_at_height(np.linspace(low, high, 50)) / 1e3
@@ -214,7 +214,8 @@ def _draw_plateau(axes: Axes, fit: YeohFit, measurements: Measurements) -> None:
     axes.indicate_inset_zoom(inset, edgecolor="#888888")
 
 
-def _draw_band(axes: Axes, fit: YeohFit, top_mm: float) -> None:
+def draw_band(axes: Axes, fit: YeohFit, top_mm: float) -> None:
+    """The 95 % confidence band of a fit, up to a height."""
     h = np.linspace(fit.balloon.rest_height, top_mm * 1e-3, 240)
     low, high = fit.pressure_band(h)
     axes.fill_betweenx(h * 1e3, low / 1e3, high / 1e3, color=COLOURS[0], alpha=0.2, lw=0, label="95 % confidence")

@@ -17,6 +17,7 @@ from bubble_protocol import steps as limits
 from bubbleskin.checks import array, instance, number, shown, text
 from bubbleskin.errors import InvalidInput
 from bubbleskin.layout import Layout
+from bubbleskin.pictured import Pictured
 from bubbleskin.sequence import files
 from bubbleskin.sequence.steps import (
     STEPS_MAX,
@@ -33,7 +34,7 @@ from bubbleskin.sequence.steps import (
 REST_MM = 5.0
 
 
-class Sequence:
+class Sequence(Pictured):
     """Steps that the wristband plays by its own clock.
 
     `steps`: `Step` and `Repeat`. `loops`: how often all of it is played; 0: until it is stopped. `board`: the only
