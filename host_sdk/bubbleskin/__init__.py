@@ -7,7 +7,8 @@ if TYPE_CHECKING:
     from bubbleskin.calibrate.measure import CalibrationProgress
     from bubbleskin.calibrate.result import BubbleCalibration, SelfCalibration
     from bubbleskin.connecting import aconnect, connect
-    from bubbleskin.contact.fit import ContactFit, Measured, fit_contact
+    from bubbleskin.contact.fit import ContactFit, fit_contact
+    from bubbleskin.contact.measured import Measured
     from bubbleskin.contact.model import CompliantContact
     from bubbleskin.contact.rigid import RigidContact
     from bubbleskin.contact.shape import Shape
@@ -74,7 +75,7 @@ _ROOMS = {
     "InvalidInput": "errors",
     "Layout": "layout",
     "LinkError": "errors",
-    "Measured": "contact.fit",
+    "Measured": "contact.measured",
     "NoEquilibrium": "errors",
     "Overtaken": "errors",
     "Plan": "planner.plan",

@@ -32,6 +32,14 @@ class Asked(NamedTuple):
     path: Path | None
 
 
+class Sheet(NamedTuple):
+    """Where the bubbles are, and what their springs are."""
+
+    board: str
+    layout_path: Path | None
+    contact_path: Path | None
+
+
 class Playing(NamedTuple):
     """Whether a plan is played, where, and whether it need not be sure."""
 
@@ -47,17 +55,17 @@ class Playing(NamedTuple):
 @click.option("--from", "begin", metavar="MM,MM,…", help="Heights of the shape that the array has now. Default: flat.")
 @click.option("--board", type=Board(), default=boards.DEFAULT, show_default=True)
 @click.option("--layout", "layout_path", type=_FILE, help="A layout of your own, in JSON, instead of a board's.")
+@click.option("--contact", "contact_path", type=_FILE, help="Springs of your own sheet: what `fit-contact` wrote.")
 @click.option("--plot", type=_FILE, help="Draw the shape from the side and from above.")
 @click.option("--play", is_flag=True, help="Play it on the wristband.")
 @click.option("--anyway", is_flag=True, help="With --play: a plan that is not sure too.")
 @device
 @as_json
-@gathered(what=Asked, playing=Playing)
+@gathered(what=Asked, sheet=Sheet, playing=Playing)
 def plan(
     what: Asked,
     begin: str | None,
-    board: str,
-    layout_path: Path | None,
+    sheet: Sheet,
     plot: Path | None,
     playing: Playing,
     json: bool,
@@ -76,11 +84,11 @@ def plan(
         raise InvalidInput("Say the shape in one way: a height in mm per bubble, or one of --shape and --file.")
     if playing.anyway and not playing.play:
         raise InvalidInput("--anyway goes with --play: it plays a plan that is not sure.")
-    layout = Layout.from_file(layout_path) if layout_path else Layout.of_board(board)
+    layout = Layout.from_file(sheet.layout_path) if sheet.layout_path else Layout.of_board(sheet.board)
     asked: Heights = (
         shapes.load(path) if path else shapes.SHAPES[shape](layout) if shape else shapes.parse_heights(heights)
     )
-    contact = CompliantContact(layout)
+    contact = CompliantContact.from_file(sheet.contact_path, layout) if sheet.contact_path else CompliantContact(layout)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with progress(Console(stderr=True), *columns) as bar:
         task = bar.add_task("planning …", total=None)

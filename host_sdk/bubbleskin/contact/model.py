@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy
-from typing import Any, Literal
+from os import PathLike
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,7 @@ from bubbleskin.contact.continuation import FINE, Outcome, PathFollower, Resolut
 from bubbleskin.contact.relax import BURST, CONVERGED, evaluate, hold, solve
 from bubbleskin.contact.shape import Contact, Shape
 from bubbleskin.errors import InvalidInput, NoEquilibrium
+from bubbleskin.files import parse_json, path_of, read_text
 from bubbleskin.layout import Layout
 from bubbleskin.membrane import YeohBalloon
 from bubbleskin.membrane.balloon import ATMOSPHERE
@@ -30,6 +32,8 @@ GRIP = 1e5
 
 _SIZES = 5.0
 """Sizes that are followed, times the rest height."""
+
+_FILED = ("kz", "kxy", "kc", "kbase", "doubt")
 
 DOUBT = 1.3
 """Springs of a sheet that nobody has measured are taken to be within this factor of the preset's, as drawn by `springs=0.3`."""
@@ -66,8 +70,8 @@ class CompliantContact:
             positive(name, number(name, value), "N/m")
         self.kz, self.kxy, self.kc, self.kbase = float(kz), float(kxy), float(kc), float(kbase)
         self.kick, self.seed = number("kick", kick), whole("seed", seed, 0, SEED_MAX)
-        self.doubt = np.full(3, DOUBT)
-        """By which factor `kz`, `kxy` and `kc` may be off, (3,): what a plan must bear to be sure."""
+        self.doubt = np.diag(np.full(3, np.log(DOUBT)))
+        """How `kz`, `kxy` and `kc` may be off: a row for each way, logarithms of factors, (3, 3). What a sure plan must bear."""
         self.bubbles = _bubble_records(layout, self.balloons)
         gap = layout.positions_mm[:, None] - layout.positions_mm[None]
         close = np.argwhere(np.triu(np.hypot(*gap.transpose(2, 0, 1)) < 1e-3, 1))
@@ -75,6 +79,26 @@ class CompliantContact:
             raise InvalidInput(
                 f"Bubbles {close[0][0]} and {close[0][1]} are in one place; the layout must keep them apart."
             )
+
+    @classmethod
+    def from_file(
+        cls, path: str | PathLike[str], layout: Layout, balloon: YeohBalloon | Sequence[YeohBalloon] | None = None
+    ) -> Self:
+        """The model with the springs of a file that `ContactFit.save` has written; `InvalidInput` for any other."""
+        what = "the file of springs"
+        where = path_of(path, what)
+        text = read_text(where, what)
+        try:
+            facts = parse_json(text, "it")
+            missing = [name for name in _FILED if not isinstance(facts, dict) or name not in facts]
+            if missing:
+                raise InvalidInput(f"it has no {missing[0]}.")
+            springs = {name: facts[name] for name in ("kz", "kxy", "kc", "kbase")}
+            return cls(layout, balloon, **springs).with_doubt(facts["doubt"])
+        except InvalidInput as error:
+            raise InvalidInput(
+                f"{where} is not a file of springs: {error} `bubbleskin fit-contact … -o springs.json` writes one."
+            ) from None
 
     def __repr__(self) -> str:
         return f"<CompliantContact of {len(self)} bubbles>"
@@ -87,23 +111,28 @@ class CompliantContact:
         """`kz`, `kbase`, `kxy`, `kc` and no grip, as in `energy.SPRINGS`."""
         return self.kz, self.kbase, self.kxy, self.kc, 0.0
 
-    def with_seed(self, seed: int) -> CompliantContact:
+    def with_seed(self, seed: int) -> Self:
         """The same model with other random nudges."""
         return self._changed(seed=whole("seed", seed, 0, SEED_MAX))
 
-    def with_doubt(self, factors: ArrayLike) -> CompliantContact:
-        """The same model whose `kz`, `kxy` and `kc` are known to these `factors`, one or (3,): 1.3 is 30 %, 1 exactly."""
-        doubt = np.broadcast_to(finite("factors", factors), (3,))
-        if (doubt < 1).any():
-            raise InvalidInput("A spring cannot be known better than to a factor of 1.")
-        return self._changed(doubt=np.array(doubt))
+    def with_doubt(self, doubt: ArrayLike) -> Self:
+        """The same model whose `kz`, `kxy` and `kc` are known to a factor, one or (3,): 1.3 is 30 %, 1 exactly.
 
-    def with_springs(self, factors: ArrayLike, kick: float, seed: int) -> CompliantContact:
+        Where they are known together, such as their ratios better than each, (3, 3) as of `doubt`.
+        """
+        given = finite("doubt", doubt)
+        if given.shape == (3, 3):
+            return self._changed(doubt=given.copy())
+        if given.shape not in ((), (1,), (3,)) or (given < 1).any():
+            raise InvalidInput("Springs are known to a factor of 1 or more: one number, three, or (3, 3) logarithms.")
+        return self._changed(doubt=np.diag(np.log(np.broadcast_to(given, (3,)))))
+
+    def with_springs(self, factors: ArrayLike, kick: float, seed: int) -> Self:
         """A sheet that could be this one: `kz`, `kxy` and `kc` times `factors`, (3,), nudged otherwise."""
         kz, kxy, kc = np.array([self.kz, self.kxy, self.kc]) * factors
         return self._changed(kz=float(kz), kxy=float(kxy), kc=float(kc), kick=kick, seed=seed)
 
-    def _changed(self, **values: Any) -> CompliantContact:
+    def _changed(self, **values: Any) -> Self:
         other = copy(self)
         vars(other).update(values)
         return other

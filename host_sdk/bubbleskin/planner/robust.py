@@ -70,7 +70,7 @@ def trials(model: CompliantContact, path: Array, start: Shape | None, limit_mm: 
     corners = list(product((-1.0, 1.0), repeat=3))
     for number in range(TRIALS):
         exponents = corners[number] if number < len(corners) else rng.uniform(-1, 1, 3)
-        other = model.with_springs(model.doubt**exponents, _KICK, seed=model.seed + number + 1)
+        other = model.with_springs(np.exp(exponents @ model.doubt), _KICK, seed=model.seed + number + 1)
         sizes = _perturbed(path, rest if start is None else start.size_mm, rng)
         shape = other.settle_sizes(np.clip(sizes, rest, limit_mm), start, resolution=_TRIAL)
         yield shape.height_mm if shape.converged else np.full(len(rest), np.inf)
