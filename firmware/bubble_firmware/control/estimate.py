@@ -77,6 +77,7 @@ _COUNT_LOW = const(3)
 _COUNT_HIGH = const(4)
 _PRESSURE_MAX = const(5)
 _TUBE_PA = const(9)
+_REST_UM = const(14)
 _CONTROL_MODE = const(15)
 _TICK = const(19)
 _ATMOSPHERE_PA = const(23)
@@ -104,6 +105,7 @@ _AIR_SD_EMPTY = const(200)  # µJ
 _ABSOLUTE_MIN = const(3000)  # 16 Pa
 _FAR_PA = const(10000)
 _FAR_MOVING_PA = const(15000)  # with what tube, rubber and steep curve add while it moves
+_LOW_UM = const(2500)  # above rest: lower, viscous rubber that is filled adds 2 Pa for each µm more
 _FAR_MAX = const(3)  # ticks
 _AIR_SD_FAR = const(20000)
 
@@ -144,11 +146,9 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
                 pressure = row[_PRESSURE]
             else:
                 row[_LOST_TICKS] = 0
-            if pressure > board[_PRESSURE_MAX]:
-                row[_SUSPECT] = 1
-                row[_OVERPRESSURE_TICKS] = row[_OVERPRESSURE_TICKS] + 1
-            else:
-                row[_OVERPRESSURE_TICKS] = 0
+            over = board[_PRESSURE_MAX] - pressure >> 31  # -1 or 0
+            row[_SUSPECT] = row[_SUSPECT] | 0 - over
+            row[_OVERPRESSURE_TICKS] = row[_OVERPRESSURE_TICKS] - over & over
             if row[_OVERPRESSURE_TICKS] >= _READINGS_MIN:
                 row[_FAULTS] = row[_FAULTS] | _OVERPRESSURE
             if row[_LOST_TICKS] >= _READINGS_MIN:
@@ -191,8 +191,7 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
         row[_AIR_METERED] = 0
 
         if due:
-            # Air: what each valve has brought in the period that ended, and what it brings in the one that begins. A valve
-            # that does nothing is looked at only where the setpoint is on its side.
+            # Air that valves have brought and bring. One that does nothing is looked at only with the setpoint on its side.
             metered = 0
             in_flight = 0
             missing = row[_SETPOINT_AIR] - row[_AIR]
@@ -313,7 +312,8 @@ def estimate(row: ptr32, board: ptr32, counts: ptr16, supply: int, mode: int) ->
 
             # A pressure that no memory explains: the air is not what was metered.
             far = pressure - knot[_KNOT_PRESSURE] - (knot[_KNOT_PRESSURE] * (row[_CURVE_ERROR] >> 4) >> 12)
-            most = _FAR_MOVING_PA if row[_STATUS] & 3 else _FAR_PA
+            low = (board[_REST_UM] + _LOW_UM << 4) - height
+            most = _FAR_MOVING_PA + ((low & ~(low >> 31) & 0 - row[_FILL_FULL]) >> 3) if row[_STATUS] & 3 else _FAR_PA
             if (most - far | most + far) >> 31 == 0 or row[_SUSPECT] | row[_EMPTY_TICKS]:
                 row[_FAR_TICKS] = 0
             elif row[_STATUS] & 3 and row[_FAR_TICKS] < _FAR_MAX:

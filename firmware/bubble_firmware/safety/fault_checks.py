@@ -81,7 +81,8 @@ _PREVIOUS_FLOW = const(26)
 _PREVIOUS_FILL_US = const(27)
 _PREVIOUS_VENT_US = const(28)
 _EMPTYING_TICKS = const(29)
-_WATCH_WORDS = const(30)
+_MOVED_PA = const(30)
+_WATCH_WORDS = const(31)
 _LOSS_MAX = const(0)
 _FROZEN_MAX = const(1)
 _CLOSED_WINDOW = const(2)
@@ -142,8 +143,7 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
 
         # The budget: what is above the threshold adds up, what is below recovers.
         used = watch[_BUDGET_USED] + pressure - limits[_BUDGET_FREE_PA]
-        if used < 0:
-            used = 0
+        used &= ~(used >> 31)
         if used > limits[_BUDGET_MAX]:
             used = limits[_BUDGET_MAX] + 1
             watch[_BUDGET_SPENT] = 1
@@ -188,8 +188,7 @@ def check_pressures(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32) -> in
                         if watch[_INFLOW] and pressure > _OVERFILLED_PA:
                             found |= _OVERFILLED_BUBBLE
 
-            # One that loses pressure through its vent and is not empty in time gets air. Whether a high one that loses none
-            # gets some, or only keeps its own, cannot be told: the supply is shut down for it, too.
+            # One that is not empty in time gets air. A high one may only keep its own: the supply is shut down for it, too.
             if pressure <= _OVERFILLED_PA or row[_LOST_TICKS]:
                 watch[_EMPTYING_TICKS] = 0
             else:
@@ -281,7 +280,7 @@ def check_air(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32):
 def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: ptr16) -> int:
     """Flow through open valves and pressure of closed lines of all bubbles; then what the next tick compares with.
 
-    Last, so it isolates every bubble with a fault in the `pulses` of this tick, and says whether one of them is new.
+    Last, so every bubble with a fault is isolated in the `pulses` of this tick. Returns whether a fault is new.
     """
     found = 0
     tick = board[_TICK_US]
@@ -315,15 +314,19 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
             if quiet == 0 or watch[_PREVIOUS_IN_FLIGHT] != 0:
                 watch[_CLOSED_TICKS] = _SETTLE_TICKS
             else:
-                if watch[_CLOSED_TICKS] <= 0 or watch[_CLOSED_TICKS] >= limits[_CLOSED_WINDOW]:
+                closed = watch[_CLOSED_TICKS]
+                if closed <= 0 or closed >= limits[_CLOSED_WINDOW]:
+                    watch[_MOVED_PA] = watch[_MOVED_PA] + pressure - watch[_CLOSED_PA] if closed <= 0 else 0
                     watch[_CLOSED_PA] = pressure
                     watch[_CLOSED_OFF_TICKS] = 0
-                    if watch[_CLOSED_TICKS] > 0:
-                        watch[_CLOSED_TICKS] = 0
-                watch[_CLOSED_TICKS] = watch[_CLOSED_TICKS] + 1
+                    closed &= closed >> 31  # not above 0
+                watch[_CLOSED_TICKS] = closed + 1
                 change = pressure - watch[_CLOSED_PA]
-                # Filled quickly, rubber relaxes: it may lose more than it may gain.
-                within = _CLOSED_WITHIN_PA + (watch[_CLOSED_PA] >> (5 if change < 0 else 6))
+                # Rubber that was filled quickly relaxes, and what was let out recovers, most of it at once.
+                moved = watch[_MOVED_PA]
+                relaxed = watch[_CLOSED_PA] + (moved & ~(moved >> 31)) >> 5
+                recovered = (watch[_CLOSED_PA] >> 6) - ((moved & moved >> 31) >> 4)
+                within = _CLOSED_WITHIN_PA + (relaxed if change < 0 else recovered)
                 if change > within or change < 0 - within:
                     watch[_CLOSED_OFF_TICKS] = watch[_CLOSED_OFF_TICKS] + 1
                     if watch[_CLOSED_OFF_TICKS] >= _READINGS_MIN:
@@ -355,6 +358,7 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                 watch[_VENTED] = 0
                 watch[_DROPPED] = 0
                 watch[_CLOSED_TICKS] = _SETTLE_TICKS
+                watch[_MOVED_PA] = watch[_CLOSED_PA]  # from no pressure
         watch[_PREVIOUS_IN_FLIGHT] = row[_AIR_IN_FLIGHT]
         watch[_PREVIOUS_SETTLING_US] = row[_SETTLING_US]
         watch[_PREVIOUS_FLOW] = row[_FILL_FLOW] if row[_FILL_US] else row[_VENT_FLOW]

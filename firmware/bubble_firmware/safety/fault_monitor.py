@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _CLOSED_TICKS = const(18)
 _LOGGED_FAULTS = const(20)
 _PREVIOUS_AIR = const(22)
-_WATCH_WORDS = const(30)
+_WATCH_WORDS = const(31)
 _LOSS_MAX = const(0)
 _FROZEN_MAX = const(1)
 _CLOSED_WINDOW = const(2)

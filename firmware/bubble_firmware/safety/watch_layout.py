@@ -43,7 +43,8 @@ PREVIOUS_FLOW = const(26)
 PREVIOUS_FILL_US = const(27)
 PREVIOUS_VENT_US = const(28)
 EMPTYING_TICKS = const(29)  # for which it has been vented and still has the pressure of a filled bubble
-WATCH_WORDS = const(30)
+MOVED_PA = const(30)  # from the pressure of the last line that was closed for a whole window to CLOSED_PA
+WATCH_WORDS = const(31)
 
 # The board's limits.
 LOSS_MAX = const(0)  # µJ in a tick that may get lost
