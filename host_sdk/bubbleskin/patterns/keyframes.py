@@ -13,10 +13,10 @@ from bubbleskin.sequence.steps import SECONDS_MAX, Repeat, Step
 
 LEAD_S = 1.0
 """In which the bubbles go to where the pattern begins."""
-LENGTH_MAX = 300.0
-"""s: a step in every tick would be 60,000 of the 65,535 that a sequence may have. Longer ones repeat."""
-_GRID_MS = 5
-"""Between moments that are looked at: a tick of the wristbands, which know no others."""
+LENGTH_MAX = 600.0
+"""s: a step every 10 ms would be 60,000 of the 65,535 that a sequence may have. Longer ones repeat."""
+_GRID_MS = 10
+"""Between moments that are looked at, and the least of a ramp: the tick of a wristband of nineteen, two of one of seven."""
 _ROUNDING_MM = 0.001
 """Targets are whole µm."""
 _NAME_MAX = 60
@@ -30,7 +30,7 @@ def keyframes(
     loops: int,
     name: str,
 ) -> Sequence:
-    """`heights` of k moments, (k, n), as a sequence whose ramps are within `within_mm` of them in every tick."""
+    """`heights` of k moments, (k, n), as a sequence whose ramps are within `within_mm` of them every 10 ms."""
     checks.instance("layout", layout, Layout, "a Layout, such as skin.layout")
     within = checks.number("within_mm", within_mm, 2 * _ROUNDING_MM, unit="mm")
     ticks = round(checks.number("seconds", seconds, _GRID_MS / 1000, LENGTH_MAX, "s") * 1000 / _GRID_MS)

@@ -54,9 +54,9 @@ class Pattern(ABC):
     ) -> Sequence:
         """`seconds` of it as a sequence that the wristband plays by its own clock, `loops` times; 0: until it is stopped.
 
-        Between its keyframes heights ramp; nowhere are they further than `within_mm` from the pattern. It takes a second first
-        to get to where the pattern begins. At most 300 s at a time. Raises `InvalidInput` where a repeat would have to jump
-        from the end to the beginning.
+        Between its keyframes heights ramp; looked at every 10 ms, none is further than `within_mm` from the pattern. It takes a
+        second first to get to where the pattern begins. At most 600 s at a time. Raises `InvalidInput` where a repeat would
+        have to jump from the end to the beginning.
         """
         range_of(low_mm, high_mm)
         return keyframes(
