@@ -193,8 +193,11 @@ class AsyncSkin:
             raise InvalidInput(f"progress is {checks.shown(progress)}; give a function of one PlaybackStatus, or None.")
         if not anyway:
             refuse_chance(sequence)
+        meant = self._player.sequence_of(sequence)
+        if not anyway:
+            meant = await self._shows.bounded(meant)
         try:
-            started = await self._player.start(sequence, at, follow=wait)
+            started = await self._player.start(meant, at, follow=wait)
             return await self._player.follow(started, progress) if wait else None
         except (asyncio.CancelledError, KeyboardInterrupt):  # nobody follows it any more
             with contextlib.suppress(LinkError):

@@ -172,3 +172,30 @@ def test_plan_is_a_flag(skin, plan):
         return
     with pytest.raises(bs.InvalidInput, match=r"plan is .*; give True or False"):
         skin.show([6.0] * 7, plan=plan)
+
+
+@pytest.mark.parametrize("name", ["pulse", "breathing"])
+def test_a_sequence_of_the_library_stays_below_the_limit(skin, name, caplog):
+    with caplog.at_level(logging.WARNING, "bubbleskin"):
+        skin.play(name, wait=False)
+    assert caplog.messages[0].startswith(
+        f"The sequence {name} would let neighbours lift a bubble past the limit of 14 mm"
+    )
+    highest = 0.0
+    for _ in range(300):
+        skin.sleep(0.02)
+        highest = max(highest, skin.simulated.height_mm.max())
+    assert 10.0 < highest <= skin.info.height_max_mm
+
+
+def test_a_sequence_of_bubbles_apart_is_played_as_it_is(skin, caplog):
+    sequence = bs.sequences.pulse(skin.layout, high_mm=9.5, loops=1)
+    skin.play(sequence)
+    assert caplog.messages == []
+    assert skin.state().target_mm == pytest.approx([5.5, *[9.5] * 6])
+
+
+def test_a_raw_sequence_is_not_cut(skin, caplog):
+    skin.play(bs.Sequence([bs.Step([12.0] * 7, 0.5)]), anyway=True)
+    assert caplog.messages == []
+    assert skin.state().target_mm == pytest.approx(12.0)

@@ -20,7 +20,14 @@ _WIDE = 96  # columns of the terminal from which the array from above stands bes
 _MEDIUM = 72  # from which there is room for the heights' history
 _RATE_SPAN = 2.0  # seconds over which the rate is taken
 
-_STYLES = {"settled": "green", "moving": "yellow", "stopped": "cyan", "fault": "bold red", "resting": "dim"}
+_STYLES = {
+    "settled": "green",
+    "missed": "magenta",
+    "moving": "yellow",
+    "stopped": "cyan",
+    "fault": "bold red",
+    "resting": "dim",
+}
 
 
 class Monitor:

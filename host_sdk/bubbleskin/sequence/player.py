@@ -17,7 +17,7 @@ from bubbleskin.link.link import Link
 from bubbleskin.sequence.compile import Compiled
 from bubbleskin.sequence.event_log import REASONS, EventLog
 from bubbleskin.sequence.library import LIBRARY
-from bubbleskin.sequence.model import Playable, playable
+from bubbleskin.sequence.model import Playable, Sequence, playable
 from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus, Progress
 from bubbleskin.sequence.steps import Settled
 from bubbleskin.sequence.uploader import Uploader
@@ -40,9 +40,13 @@ class Player:
         self._layout = layout
         self._upload: Uploader | None = None  # of the sequence played last
 
+    def sequence_of(self, what: Playable) -> Sequence:
+        """What is meant: a sequence of the library by its name, or what `playable` knows."""
+        return LIBRARY[what](self._layout) if isinstance(what, str) and what in LIBRARY else playable(what)
+
     async def start(self, what: Playable, at: float | None, *, follow: bool) -> Uploader:
         """Upload a sequence, arm and start it; `follow`: whether its rest can be sent while it plays. See `Skin.play`."""
-        sequence = LIBRARY[what](self._layout) if isinstance(what, str) and what in LIBRARY else playable(what)
+        sequence = self.sequence_of(what)
         compiled = Compiled.of(sequence, self._info, self._layout)
         start = self._tick(at)
         link = self._link

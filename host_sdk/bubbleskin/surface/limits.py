@@ -24,8 +24,13 @@ _LIFTED_MM = 0.02
 class Limits:
     """Of a board: `rest_mm` and `alone_mm` are what a bubble may have alone."""
 
-    def __init__(self, gaps: Gaps, rest_mm: float, alone_mm: float):
+    def __init__(self, gaps: Gaps, rest_mm: float, alone_mm: float, spare_mm: float = 0.0):
         self.gaps, self.rest_mm, self.alone_mm = gaps, rest_mm, alone_mm
+        self._lifted_mm = alone_mm - spare_mm
+
+    def lowered(self, spare_mm: float) -> "Limits":
+        """The same with lifted tops `spare_mm` lower."""
+        return Limits(self.gaps, self.rest_mm, self.alone_mm, spare_mm)
 
     def clip(self, alone_mm: Array) -> Array:
         """Heights alone within what a bubble may have, (n,)."""
@@ -37,7 +42,7 @@ class Limits:
         A top that is above the limit to begin with may come down.
         """
         for number, member in enumerate(members):
-            limit = self.alone_mm + (DOUBT_MM if number else 0.0)
+            limit = self._lifted_mm + (DOUBT_MM if number else 0.0)
             begin, top = member.alone_mm, member.height_mm
             parts = max(1, int(np.ceil(np.abs(alone_mm - begin).max() / _LOOKS_MM)))
             for part in range(1, parts + 1):

@@ -22,6 +22,7 @@ from bubbleskin.surface.compensate import SHORT_MM, Answer, Compensation
 from bubbleskin.surface.gaps import Gaps
 from bubbleskin.surface.kept import KeptShape
 from bubbleskin.surface.limits import Limits
+from bubbleskin.surface.played import cut, highest_cut, steps_of
 from bubbleskin.surface.told import told
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ _SAME_MM = 5e-4
 """Heights are sent in whole µm."""
 _NEAR_MM = 0.3
 """A way is gone where all heights alone are so near its end."""
+_AHEAD = 64
+"""Of a sequence so many steps are looked at for the one that is played."""
 _POLL = 0.02
 """Seconds between two looks at whether a shape has settled."""
 _QUIET = 1.0
@@ -118,6 +121,28 @@ class Shows:
         self._say_short(alone, answer, streams)
         steps += [np.rint(step * 1000) / 1000 for step in answer.steps]
         return await self._go(alone, steps, answer, over if streams else max(over, RAMP_S), wait)
+
+    async def bounded(self, sequence: Sequence) -> Sequence:
+        """The sequence, cut where neighbours would lift a bubble past the limit, from the shape of this moment."""
+        self.unasked()
+        gaps = self._limits.gaps
+        if not gaps or sequence.bubbles != len(self._layout):
+            return sequence
+        steps = steps_of(sequence)
+        if not gaps.apart(np.maximum(np.max(steps, axis=0), self._limits.rest_mm)):
+            await self.look()
+            height_mm = await self._thought(lambda: highest_cut(sequence, self._kept, self._limits))
+            if height_mm is not None:
+                _log.warning(
+                    "The sequence%s would let neighbours lift a bubble past the limit of %g mm: its targets are cut at %g mm.",
+                    f" {sequence.name}" if sequence.name else "",
+                    self._info.height_max_mm,
+                    height_mm,
+                )
+                sequence = cut(sequence, height_mm)
+                steps = steps_of(sequence)
+        self._steps = steps
+        return sequence
 
     async def _go(self, asked: Array, steps: list[Array], answer: Answer, over: float, wait: bool) -> State | None:
         """Send these steps, `over` s for all of them."""
@@ -224,7 +249,7 @@ class Shows:
 
     def _pass_steps(self, target_mm: Array) -> bool:
         """Follow the steps before the one whose target this is; False where it is none of them."""
-        for number, step in enumerate(self._steps):
+        for number, step in enumerate(self._steps[:_AHEAD]):
             if np.abs(step - target_mm).max() < _SAME_MM:
                 for passed in self._steps[:number]:
                     self._kept.go(passed)
