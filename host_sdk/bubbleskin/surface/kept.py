@@ -27,7 +27,10 @@ VOLUMES_MM = 0.05
 PACE = 0.04
 """By how much bubbles are faster and slower than asked, RMS: some arrive some ms before others."""
 STIR_MM = 0.01
-"""What a told height must change by for the shape to be followed there."""
+"""What is less makes no difference."""
+_FOLLOWED_MM = 0.1
+"""The shape is followed to told heights that differ by more; up to there its slope says enough, and noise lifts nobody."""
+_SLOPED_MM = 0.2  # by what slopes correct at most: where a shape is about to snap they say nothing
 _DOUBTED = ("kz", "kxy", "kc")
 
 
@@ -45,6 +48,7 @@ class KeptShape:
         self.known = False
         """Whether the way is known on which they came here, or none matters."""
         self.members: list[HeldShape] = []
+        self._slope: Array | None = None  # of the likeliest where it is
         self._sd_of: tuple[Array, Array] | None = None  # what it was asked with, and the answer
 
     def forget(self) -> None:
@@ -56,12 +60,11 @@ class KeptShape:
         if self.gaps.apart(alone_mm):
             self.alone_mm, self.known, self.members = alone_mm, True, []
             return
-        if self.alone_mm is not None and self.members and np.abs(alone_mm - self.alone_mm).max() < STIR_MM:
-            return
-        for member in self._begun():
-            member.go(alone_mm)
+        if not self.members or np.abs(alone_mm - self.members[0].alone_mm).max() > _FOLLOWED_MM:
+            for member in self._begun():
+                member.go(alone_mm)
+            self._slope = self._sd_of = None
         self.alone_mm = alone_mm
-        self._sd_of = None
 
     def begun(self) -> "list[HeldShape]":
         """Copies of all members to try a way with, (7,)."""
@@ -76,7 +79,7 @@ class KeptShape:
 
     def take(self, members: "list[HeldShape]") -> None:
         """Be as the members of a way that has been tried are at its end."""
-        self.alone_mm, self._sd_of = members[0].alone_mm, None
+        self.alone_mm, self._slope, self._sd_of = members[0].alone_mm, None, None
         apart = self.gaps.apart(self.alone_mm)
         self.known, self.members = self.known or apart, [] if apart else members
 
@@ -89,7 +92,18 @@ class KeptShape:
     @property
     def lift_mm(self) -> Array:
         """How much higher each bubble is than alone, (n,)."""
-        return self.members[0].lift_mm if self.members else np.zeros(len(self._layout))
+        if not self.members or self.alone_mm is None:
+            return np.zeros(len(self._layout))
+        likeliest = self.members[0]
+        off = self.alone_mm - likeliest.alone_mm
+        return likeliest.lift_mm + (self._slopes() @ off - off).clip(-_SLOPED_MM, _SLOPED_MM)
+
+    def _slopes(self) -> Array:
+        """∂top/∂size, (n, n); where the shape is about to snap, that of bubbles alone."""
+        if self._slope is None:
+            slope = self.members[0].slope()
+            self._slope = np.eye(len(self._layout)) if slope is None else slope
+        return self._slope
 
     def sd_mm(self, alone_sd_mm: Array) -> Array:
         """Standard deviation of the tops, (n,): of volumes known to `alone_sd_mm`, and of springs; nan where nothing is known."""
@@ -100,9 +114,7 @@ class KeptShape:
         return self._sd_of[1]
 
     def _deviation(self, alone_sd_mm: Array) -> Array:
-        slope = self.members[0].slope()
-        if slope is None:
-            slope = np.eye(len(alone_sd_mm))
+        slope = self._slopes()
         tops = np.array([member.height_mm for member in self.members])
         offsets = np.array([member.offset_mm for member in self.members[1:]])
         # Of each spring twice, harder and softer. What their volumes do is in the other term.

@@ -48,7 +48,7 @@ _STEP = Settled(tolerance_mm=0.2, timeout_s=3.0)
 _SAME_MM = 5e-4
 """Heights are sent in whole µm."""
 _NEAR_MM = 0.3
-"""A way is gone where all heights alone are so near its end."""
+"""A way is gone where all heights alone rest so near its end."""
 _AHEAD = 64
 """Of a sequence so many steps are looked at for the one that is played."""
 _POLL = 0.02
@@ -223,28 +223,32 @@ class Shows:
         if not self._limits.gaps or np.isnan(state.alone_mm).any():
             return state
         ours = self._pass_steps(state.target_mm)
-        kept = self._follow(state.alone_mm, ours)
+        kept = self._follow(state.alone_mm, ours, moves="moving" in state.status)
         asked = self._asked if ours and self._asked is not None else None
         if asked is None and not kept.members:
             return state
         on_the_way = asked is not None and len(self._steps) > 1
         return told(state, kept, state.target_mm if asked is None else asked, on_the_way=on_the_way)
 
-    def _follow(self, alone_mm: Array, ours: bool) -> KeptShape:
+    def _follow(self, alone_mm: Array, ours: bool, moves: bool) -> KeptShape:
         """The shape with these heights alone. On the way of a show they are told less well than they were sent: what was foreseen
-        is kept, once they are near its end."""
+        is kept, once they rest near its end."""
         leg = self._leg
         if leg is None or self._seen or not ours:
             self._kept.go(alone_mm)
             return self._kept
-        if len(self._steps) == 1 and np.abs(alone_mm - np.maximum(leg.end, self._limits.rest_mm)).max() < _NEAR_MM:
+        near = np.abs(alone_mm - np.maximum(leg.end, self._limits.rest_mm)).max() < _NEAR_MM
+        if len(self._steps) == 1 and near and not moves:
             self._seen = True
             self._kept.take(leg.members)
             self._kept.go(alone_mm)
             return self._kept
         self._looked = alone_mm
         on_its_way = self._kept.copy()
-        on_its_way.go(alone_mm)
+        if len(self._steps) == 1 and near:
+            on_its_way.take(leg.members)
+        else:
+            on_its_way.go(alone_mm)
         return on_its_way
 
     def _pass_steps(self, target_mm: Array) -> bool:
