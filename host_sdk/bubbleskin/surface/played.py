@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 FOLLOWED = 5000
 """Steps that are followed at most; a sequence without end has come back to its beginning long before."""
-_LOOPS = 2
+_TIMES = 2
 """Times that all of it is followed: the second begins where the first ended."""
 _MANY = 200
 """Of more steps only the likeliest wristband is followed."""
@@ -39,7 +39,7 @@ def steps_of(sequence: Sequence) -> list[Array]:
     """The heights alone that it asks for, (n,) mm each, in the order in which they are played; 0 where none was asked yet."""
     now = np.zeros(sequence.bubbles)
     found = []
-    for index in islice(sequence.unrolled(), min(FOLLOWED, _LOOPS * _length(sequence.steps))):
+    for index in islice(sequence.unrolled(), min(FOLLOWED, _TIMES * _length(sequence.steps))):
         targets = sequence.each[index].targets_mm
         if targets is not None:
             now = np.array([old if new is None else new for old, new in zip(now, targets, strict=True)])
@@ -95,4 +95,4 @@ def _followed(kept: KeptShape, steps: int) -> "Iterator[HeldShape]":
 
 def _length(parts: Items[Step | Repeat]) -> int:
     """Steps of one time through, repeats without end taken twice."""
-    return sum(1 if isinstance(part, Step) else (part.times or _LOOPS) * _length(part.steps) for part in parts)
+    return sum(1 if isinstance(part, Step) else (part.times or _TIMES) * _length(part.steps) for part in parts)
