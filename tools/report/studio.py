@@ -18,11 +18,10 @@ from playwright.sync_api import BrowserContext, Page, sync_playwright
 from bubbleskin.device.state import State
 from bubbleskin.layout import Layout
 from bubbleskin.studio.array import Array
+from bubbleskin.studio.owner import RATE_HZ
 from bubbleskin.studio.server import Studio
 
 SECONDS = 5.0
-ASKED_HZ = 40.0
-"""Of the synthetic states: more than the studio's 20, to see where drawing ends."""
 PICTURE = "docs/pictures/studio.png"
 DOME_MM = 12.5, 6.0  # its middle, and how much lower the outer ring is
 
@@ -49,6 +48,15 @@ def drawn_hz(page: Page) -> float:
     return (int(figure.get_attribute("data-drawn") or 0) - first) / (time.monotonic() - begin)
 
 
+async def wave(studio: Studio) -> None:
+    """All bubbles go up and down, ten times a second elsewhere, until something else is asked."""
+    random = np.random.default_rng(0)
+    studio.owner.begin("report")
+    while studio.owner.activity == "report":
+        studio.owner.ask(random.uniform(6.0, 9.5, len(studio.desk.layout)))
+        await asyncio.sleep(0.1)
+
+
 def many(studio: Studio) -> None:
     """A page of synthetic states: no board has 37 bubbles."""
 
@@ -63,11 +71,23 @@ def many(studio: Studio) -> None:
         random = np.random.default_rng(0)
 
         def take() -> None:
-            heights, targets = random.uniform(5, 13, (2, n))
+            heights, targets = random.uniform(6, 11, (2, n))
             sd = np.full(n, 0.1)
-            array.take(State(time.monotonic(), "active", heights, heights, targets, ("moving",) * n, ((),) * n, sd))
+            array.take(
+                State(
+                    time=time.monotonic(),
+                    mode="active",
+                    height_mm=heights,
+                    alone_mm=heights,
+                    pressure_kpa=heights,
+                    target_mm=targets,
+                    status=("moving",) * n,
+                    faults=((),) * n,
+                    sd_mm=sd,
+                )
+            )
 
-        ui.timer(1 / ASKED_HZ, take)
+        ui.timer(1 / RATE_HZ, take)
 
 
 def pointer_ms(studio: Studio, page: Page) -> tuple[float, float, int]:
@@ -95,8 +115,9 @@ def picture(studio: Studio, context: BrowserContext, loop: asyncio.AbstractEvent
     page.goto(f"{studio.address}/?tab=live")
     page.locator("[data-bubble='0'][aria-label]").wait_for()
     loop.call_soon_threadsafe(studio.owner.ask, high - less * (away / away.max()) ** 2, 1.0)
-    page.wait_for_timeout(3500)
+    page.wait_for_timeout(12000)  # until the strip has forgotten what was before
     page.screenshot(path=PICTURE)
+    page.close()  # a page behind another draws once a second
     print(f"wrote {PICTURE}")
 
 
@@ -116,7 +137,8 @@ def main() -> None:
         page = context.new_page()
         page.goto(studio.url)
         page.locator("[data-bubble='0'][aria-label]").wait_for()
-        print(f"live, 19 bubbles: {drawn_hz(page):.1f} of 20 updates/s drawn")
+        loop.call_soon_threadsafe(lambda: loop.create_task(wave(studio)))
+        print(f"live, 19 bubbles that all move: {drawn_hz(page):.1f} of {RATE_HZ:g} updates/s drawn")
         median, most, moves = pointer_ms(studio, page)
         print(f"pointer to target, 19 bubbles: median {median:.0f} ms, p95 {most:.0f} ms of {moves} targets")
         if chosen.picture:
@@ -125,7 +147,7 @@ def main() -> None:
             page.goto(f"{studio.address}/many?rings={rings}")
             page.locator("[data-bubble='0'][aria-label]").wait_for()
             print(
-                f"synthetic, {len(Layout.hexagon(rings))} bubbles: {drawn_hz(page):.1f} of {ASKED_HZ:g} updates/s drawn"
+                f"synthetic, {len(Layout.hexagon(rings))} bubbles: {drawn_hz(page):.1f} of {RATE_HZ:g} updates/s drawn"
             )
         browser.close()
     studio.leave()

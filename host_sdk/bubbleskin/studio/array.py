@@ -61,6 +61,7 @@ def message(state: State) -> dict[str, Any]:
     short: dict[str, Any] = {
         "t": round(state.time, 3),
         "h": _rounded(state.height_mm),
+        "a": _rounded(state.alone_mm),
         "g": _rounded(state.target_mm),
         "p": _rounded(state.pressure_kpa),
         "s": state.status,
@@ -68,9 +69,6 @@ def message(state: State) -> dict[str, Any]:
     }
     if state.sd_mm is not None:
         short["sd"] = _rounded(state.sd_mm)
-    alone = getattr(state, "alone_mm", None)  # firmware and SDK that know what a neighbour lifts
-    if alone is not None:
-        short["a"] = _rounded(alone)
     return short
 
 

@@ -27,6 +27,7 @@ GRACE_S = 3.0
 """Seconds without any page after which everything vents: a page that is reloaded is back sooner."""
 _RETRY_S = 1.0
 _CARE_S = 0.5
+_READ_S = 6.0
 _LATENCIES = 500
 
 
@@ -56,6 +57,8 @@ class Owner:
         self.url = ""
         self.problem = ""
         """Why there is no device, or what it refused last; empty where all is well."""
+        self.note = ""
+        """What the SDK has warned of lately, such as heights that neighbours do not allow."""
         self.state: State | None = None
         self.health: Health | None = None
         self.activity = ""
@@ -67,6 +70,7 @@ class Owner:
         """Called with each new state, in the event loop."""
         self._attended = attended
         self._left_at: float | None = None
+        self._noted_at = 0.0
         self._wanted: Intention | None = None
         self._wake = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
@@ -190,6 +194,11 @@ class Owner:
         self.problem = ""
         return True
 
+    def warn(self, sentence: str) -> None:
+        """Keep a warning for as long as it takes to read it."""
+        self.note = sentence
+        self._noted_at = time.monotonic()
+
     # What runs all the time.
 
     async def _follow(self) -> None:
@@ -235,6 +244,8 @@ class Owner:
             self._left_at = None if self._attended() or self._playing else self._left_at or time.monotonic()
             if self._left_at and time.monotonic() - self._left_at > GRACE_S and not self._is_flat():
                 await self.vent()
+            if time.monotonic() - self._noted_at > _READ_S:
+                self.note = ""
             await asyncio.sleep(_CARE_S)
 
     def _is_flat(self) -> bool:

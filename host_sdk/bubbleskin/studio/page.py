@@ -117,8 +117,8 @@ class Page:
             self._skin = owner.skin
             ui.navigate.reload()
             return
-        self._notice.text = owner.problem
-        self._notice.set_visibility(bool(owner.problem))
+        self._notice.text = owner.problem or owner.note
+        self._notice.set_visibility(bool(owner.problem or owner.note))
         self._where.text = shown(owner.url)
         self._facts.say(
             doing=_doing(owner.state, owner.activity),

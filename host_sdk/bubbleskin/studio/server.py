@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import errno
+import logging
 import secrets
 import socket
 from collections.abc import Callable
@@ -60,11 +61,14 @@ class Studio:
         self._server = _Server(config, self.owner)
         opening = asyncio.create_task(self.owner.open(device))
         serving = asyncio.create_task(self._server.serve([self._socket]))
+        notes = _Notes(self.owner)
+        logging.getLogger("bubbleskin").addHandler(notes)
         try:
             await opening
             ready()
             await serving
         finally:
+            logging.getLogger("bubbleskin").removeHandler(notes)
             await self.owner.close()
             self._socket.close()
 
@@ -124,6 +128,17 @@ def is_attended() -> bool:
 
 def _answer(problem: str) -> JSONResponse:
     return JSONResponse({"problem": problem}, 409 if problem else 200)
+
+
+class _Notes(logging.Handler):
+    """Shows in the page what the SDK logs as a warning."""
+
+    def __init__(self, owner: Owner):
+        super().__init__(logging.WARNING)
+        self._owner = owner
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._owner.warn(record.getMessage())
 
 
 class _Server(uvicorn.Server):

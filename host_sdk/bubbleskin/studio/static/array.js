@@ -9,6 +9,7 @@ const STATUS = {
   moving: "#56b4e9",
   settled: "#009e73",
   unsure: "#f0e442",
+  missed: "#cc79a7",
   stopped: "#0072b2",
   fault: "#d55e00",
   unknown: "#cccccc",
@@ -209,7 +210,7 @@ export default {
     drawBubble(parts, bubble, now) {
       const [x, y] = this.positions[bubble];
       const top = now.h[bubble];
-      const across = Math.min(now.a ? now.a[bubble] : top, top); // what neighbours lift stands higher than it is wide
+      const across = Math.min(now.a[bubble], top); // what neighbours lift stands higher than it is wide
       const [cx, cy] = this.place(x, y, top - across / 2);
       const circle = (node, u, v, r) => {
         node.setAttribute("cx", u.toFixed(2));
@@ -251,7 +252,7 @@ export default {
       legend.replaceChildren();
       const add = (tag, className, words = "", style = "") => legend.append(Object.assign(document.createElement(tag), { className, textContent: words, style }));
       if (this.colour === "status") {
-        for (const name of ["resting", "moving", "settled", "unsure", "stopped", "fault"]) {
+        for (const name of ["resting", "moving", "settled", "unsure", "missed", "stopped", "fault"]) {
           add("i", "swatch", "", `background:${STATUS[name]}`);
           add("span", "", name);
         }
