@@ -96,7 +96,7 @@ def chromium():
         options = ["--no-sandbox", "--disable-gpu"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
         context = browser.new_context(viewport={"width": 1280, "height": 800})
-        context.set_default_timeout(8000)
+        context.set_default_timeout(20000)
         yield context
         browser.close()
 

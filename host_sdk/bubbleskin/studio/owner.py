@@ -230,7 +230,7 @@ class Owner:
             if wanted is None or wanted is sent:
                 continue
             sent = wanted
-            # Unplanned: to look for what neighbours do takes up to seconds for 19 bubbles, and would hold up stop, vent and pings.
+            # Unplanned: to reckon what neighbours do takes seconds for 19 bubbles, and would hold up stop, vent and pings.
             done = await self._say(skin.show(wanted.heights_mm, over=wanted.over, wait=False, plan=False))
             if done and wanted.stamp:
                 self.latencies.append(time.time() - wanted.stamp)
