@@ -95,7 +95,7 @@ def _of_the_chip(parts: tuple[str, ...], console: Console) -> list[Row]:
 
 
 def _of_control(asked: OfControl, console: Console) -> list[Row]:
-    from bubbleskin.bench.control import measure, page
+    from bubbleskin.bench.control import measure, page, touching
 
     root = _repository() if asked.write else None  # found before anything is measured for a quarter of an hour
     found = []
@@ -103,9 +103,11 @@ def _of_control(asked: OfControl, console: Console) -> list[Row]:
         for one in measure.figures(asked.size, asked.seed):
             found.append(one)
             status.update(f"holding heights … {len(found)} of {measure.COUNT}: {one.plant}, {one.use}, {one.contender}")
+        status.update("bubbles that touch …")
+        others = list(touching.rows(asked.size, asked.seed))
     if root:
         page.write(root, found)
-    return [row for one in found for row in measure.rows_of(one)]
+    return [row for one in found for row in measure.rows_of(one)] + others
 
 
 def _repository() -> Path:

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 
+from bubbleskin.bench.control import touching
 from bubbleskin.bench.control.contenders import CONTENDERS, PRESENT
 from bubbleskin.bench.control.figures import WRONG_MM, Figures
 from bubbleskin.bench.control.plants import KINDS, REAL, Kind
@@ -54,6 +55,7 @@ def rows(size: float = 1.0, seed: int = 1) -> Iterator[Row]:
     """Heights that were held, told and missed, of the firmware and of the first law on the same plants."""
     for one in figures(size, seed):
         yield from rows_of(one)
+    yield from touching.rows(size, seed)
 
 
 def rows_of(one: Figures) -> Iterator[Row]:

@@ -1,0 +1,136 @@
+"""Bubbles that touch: true tops of the firmware with the host's shows, planned and raw, on calibrated sheets of real rubber."""
+
+import logging
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bubbleskin.async_skin import AsyncSkin
+from bubbleskin.bench.control.plants import BOARD, REAL, sheet
+from bubbleskin.bench.rows import Row, share_of
+from bubbleskin.errors import DeviceFault
+from bubbleskin.link.link import run_sync
+from bubbleskin.sim.board import SimulatedBoard
+from bubbleskin.sim.transport import SimulatedTransport
+from bubbleskin.skin import Skin
+
+Array = NDArray[np.float64]
+
+_SHEETS, _SHAPES, _WILD, _FRAMES = 6, 6, 20, 240
+"""Sheets at full size; of each shapes that can be had, random heights that mostly cannot, frames of a stream."""
+_HERTZ = 30.0
+_CONDITIONED_MM = 14.0
+_FLAT_S, _STAND_S = 1.5, 1.0
+_LEAST_MM = 0.1  # of lift, for a shape to count as one of bubbles that touch
+_WAITS_S = 4.0
+_LOOK_S = 0.05
+
+
+def rows(size: float = 1.0, seed: int = 1) -> Iterator[Row]:
+    """Shapes that the same sheet has had, asked again; a hill under a pointer; random heights against the limit."""
+    planned: list[Array] = []
+    raw: list[Array] = []
+    streamed: list[Array] = []
+    tops: list[float] = []
+    logging.getLogger("bubbleskin.surface").setLevel(logging.ERROR)  # what cannot be had is counted, not said
+    for number in range(share_of(_SHEETS, size)):
+        skin = _connected(seed + number)
+        rng = np.random.default_rng((seed + number, *b"touching"))
+        for had in _shapes(skin, rng):
+            for plan, errors in ((True, planned), (False, raw)):
+                if _shown(skin, had, plan):
+                    errors.append(_truth(skin) - had)
+        streamed += _stream(skin)
+        tops += [_highest(skin, rng) for _ in range(share_of(_WILD, size))]
+        skin.close()
+    limit = skin.info.height_max_mm
+    for name, errors, rms, most in (
+        ("shapes that can be had, show", planned, "≤ 0.15", "≤ 0.5"),
+        ("shapes that can be had, plan=False", raw, "", ""),
+        ("a stream of 30 Hz, show", streamed, "≤ 0.2", ""),
+    ):
+        if errors:
+            off = np.concatenate(errors)
+            yield Row(f"touching, {REAL.name}, {name}: RMS", float(np.sqrt(np.mean(off**2))), "mm", rms)
+            yield Row(f"touching, {REAL.name}, {name}: most", float(np.abs(off).max()), "mm", most)
+    yield Row(f"touching, {REAL.name}, {len(tops)} random shows: highest top", max(tops), "mm", f"≤ {limit:g}")
+    above = sum(top > limit for top in tops)
+    yield Row(f"touching, {REAL.name}, {len(tops)} random shows: above {limit:g} mm", above, "", "0")
+
+
+def _connected(seed: int) -> Skin:
+    one = sheet(REAL, seed)
+    board = SimulatedBoard(BOARD, seed=seed, parameters=one.parameters)
+    board.plant.soften(_CONDITIONED_MM)
+    skin = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, f"sim://{BOARD}"), 2.0, simulated=board)))
+    skin.sleep(1.0)
+    if one.tables and one.trim:
+        skin.upload_tables(one.tables, anyway=True)
+        skin.upload_trim(one.trim, anyway=True)
+    return skin
+
+
+def _truth(skin: Skin) -> Array:
+    assert skin.simulated
+    return skin.simulated.height_mm
+
+
+def _flat(skin: Skin) -> None:
+    skin.vent()
+    skin.sleep(_FLAT_S)
+    skin.clear_faults()
+
+
+def _shapes(skin: Skin, rng: np.random.Generator) -> Iterator[Array]:
+    """Tops that the sheet has when it is raised in random groups: where bubbles touch, and below the limit."""
+    found = 0
+    assert skin.simulated
+    while found < _SHAPES:
+        _flat(skin)
+        heights, group = rng.uniform(5.5, 13.0, skin.info.bubbles), rng.integers(0, 3, skin.info.bubbles)
+        for last in range(3):
+            skin.show(np.where(group <= last, heights, 0.0), over=0.6, wait=False, plan=False)
+            skin.sleep(0.6 + _STAND_S)
+        had = _truth(skin)
+        lift = np.abs(had - skin.simulated.alone_mm).max()
+        if had.max() <= skin.info.height_max_mm and lift > _LEAST_MM and not skin.faults():
+            found += 1
+            yield had
+
+
+def _shown(skin: Skin, heights: Array, plan: bool) -> bool:
+    """From flat; False where a fault ended it."""
+    _flat(skin)
+    try:
+        skin.show(heights, over=0.5, plan=plan)
+    except DeviceFault:
+        return False
+    skin.sleep(_STAND_S)
+    return True
+
+
+def _stream(skin: Skin) -> Iterator[Array]:
+    """A hill, steep enough to be lifted by its flanks, that goes about under a pointer; errors of each frame."""
+    x, y = skin.layout.positions_mm.T
+    _flat(skin)
+    skin.show(np.full(len(x), 6.0))
+    for frame in range(_FRAMES):
+        at = 8 * np.cos(frame / 25), 8 * np.sin(frame / 17)
+        hill = 6 + 6 * np.exp(-((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2 * 8**2))
+        skin.show(hill, over=1 / _HERTZ, wait=False)
+        skin.sleep(1 / _HERTZ)
+        if frame > _HERTZ:
+            yield _truth(skin) - hill
+
+
+def _highest(skin: Skin, rng: np.random.Generator) -> float:
+    """The highest top of a show of random heights up to the limit, from whatever was there before."""
+    skin.show(rng.uniform(5.0, skin.info.height_max_mm, skin.info.bubbles), wait=False)
+    highest = 0.0
+    for _ in range(round(_WAITS_S / _LOOK_S)):
+        skin.sleep(_LOOK_S)
+        highest = max(highest, float(_truth(skin).max()))
+    if skin.faults():
+        _flat(skin)
+    return highest
