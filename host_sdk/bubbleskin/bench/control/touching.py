@@ -37,11 +37,11 @@ def rows(size: float = 1.0, seed: int = 1) -> Iterator[Row]:
     for number in range(share_of(_SHEETS, size)):
         skin = _connected(seed + number)
         rng = np.random.default_rng((seed + number, *b"touching"))
-        for had in _shapes(skin, rng):
+        for had in _shapes(skin, rng, share_of(_SHAPES, size)):
             for plan, errors in ((True, planned), (False, raw)):
                 if _shown(skin, had, plan):
                     errors.append(_truth(skin) - had)
-        streamed += _stream(skin)
+        streamed += _stream(skin, share_of(_FRAMES, size))
         tops += [_highest(skin, rng) for _ in range(share_of(_WILD, size))]
         skin.close()
     limit = skin.info.height_max_mm
@@ -82,11 +82,11 @@ def _flat(skin: Skin) -> None:
     skin.clear_faults()
 
 
-def _shapes(skin: Skin, rng: np.random.Generator) -> Iterator[Array]:
+def _shapes(skin: Skin, rng: np.random.Generator, count: int) -> Iterator[Array]:
     """Tops that the sheet has when it is raised in random groups: where bubbles touch, and below the limit."""
     found = 0
     assert skin.simulated
-    while found < _SHAPES:
+    while found < count:
         _flat(skin)
         heights, group = rng.uniform(5.5, 13.0, skin.info.bubbles), rng.integers(0, 3, skin.info.bubbles)
         for last in range(3):
@@ -110,12 +110,12 @@ def _shown(skin: Skin, heights: Array, plan: bool) -> bool:
     return True
 
 
-def _stream(skin: Skin) -> Iterator[Array]:
+def _stream(skin: Skin, frames: int) -> Iterator[Array]:
     """A hill, steep enough to be lifted by its flanks, that goes about under a pointer; errors of each frame."""
     x, y = skin.layout.positions_mm.T
     _flat(skin)
     skin.show(np.full(len(x), 6.0))
-    for frame in range(_FRAMES):
+    for frame in range(frames):
         at = 8 * np.cos(frame / 25), 8 * np.sin(frame / 17)
         hill = 6 + 6 * np.exp(-((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2 * 8**2))
         skin.show(hill, over=1 / _HERTZ, wait=False)
