@@ -25,7 +25,7 @@ from bubbleskin.skin import Skin
 PRESENT, FIRST = "this firmware", "the first law"
 _TESTED_S = 1.0  # after power comes: the self-test, and what is in the bubbles has gone
 _PATIENCE_S = 2.0
-_CONDITIONED_MM = 14.0
+CONDITIONED_MM = 14.0
 """Real rubber has been this high once, before anybody measured it."""
 
 
@@ -34,7 +34,7 @@ class Watched(SimulatedBoard):
 
     def __init__(self, sheet: Sheet, firmware: Firmware | None = None):
         super().__init__(BOARD, seed=sheet.seed, contact=False, firmware=firmware, parameters=sheet.parameters)
-        self.plant.soften(_CONDITIONED_MM)
+        self.plant.soften(CONDITIONED_MM)
         self._heights: list[NDArray[np.float64]] = []
         self._energised: list[NDArray[np.float64]] = []
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bubbleskin.async_skin import AsyncSkin
+from bubbleskin.bench.control.contenders import CONDITIONED_MM
 from bubbleskin.bench.control.plants import BOARD, REAL, sheet
 from bubbleskin.bench.rows import Row, share_of
 from bubbleskin.errors import DeviceFault
@@ -20,7 +21,6 @@ Array = NDArray[np.float64]
 _SHEETS, _SHAPES, _WILD, _FRAMES = 6, 6, 20, 240
 """Sheets at full size; of each shapes that can be had, random heights that mostly cannot, frames of a stream."""
 _HERTZ = 30.0
-_CONDITIONED_MM = 14.0
 _FLAT_S, _STAND_S = 1.5, 1.0
 _LEAST_MM = 0.1  # of lift, for a shape to count as one of bubbles that touch
 _WAITS_S = 4.0
@@ -62,7 +62,7 @@ def rows(size: float = 1.0, seed: int = 1) -> Iterator[Row]:
 def _connected(seed: int) -> Skin:
     one = sheet(REAL, seed)
     board = SimulatedBoard(BOARD, seed=seed, parameters=one.parameters)
-    board.plant.soften(_CONDITIONED_MM)
+    board.plant.soften(CONDITIONED_MM)
     skin = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, f"sim://{BOARD}"), 2.0, simulated=board)))
     skin.sleep(1.0)
     if one.tables and one.trim:
