@@ -14,7 +14,7 @@ SAYS = {
     "02_from_a_formula": r"The dome is at -15 mm, bubble 5 (.*\n)*.* \+0 mm, bubble 0 (.*\n)*.* bubble 2 is the highest\.\n",
     "03_watch": r"( *\d+\.\d\d){7} moving\n(.*\n){10,40}( *\d+\.\d\d){7} (settled|unsure)\n",
     "04_sequence": r"16 steps in \d\.\d s\n",
-    "05_order_matters": r"pop-up: the middle is truly at 1[34]\.\d mm\nflat twin: the middle is truly at 1[12]\.\d mm\n",
+    "05_order_matters": r"pop-up: the middle is truly at 11\.[789] mm\nflat twin: the middle is truly at 11\.[01] mm\n",
     "06_pattern": r"\(\(ripple\(\)\.slow\(2\) \* 0\.5\) \+ \(wave\(\)\.rotate\(30\) \* 0\.5\)\): \d+ steps, within 0\.1 mm\n",
     "07_terrain": r"(\(\d+, \d+\) mm: contrast \d\.\d mm, \d+ steps of \d\.\d\d mm; .* apart\n){5}",
     "08_buttons": r"lamp on\nbrightness 1 of 6\nbrightness 2 of 6\nbrightness 3 of 6\nbubbles 0, 1, 2 and 3 are up\n",
