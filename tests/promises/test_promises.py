@@ -83,6 +83,21 @@ def test_a_reservoir_whose_sensor_lies_takes_no_bubble_too_high(lie, world):
     print(f"{lie}: {most:.2f} mm")
 
 
+@pytest.mark.medium
+@pytest.mark.parametrize("moving", [2, 4, 5])
+def test_nor_does_it_when_others_rise_after_the_first(moving, world):
+    """Pump and valves are in balance for so long that what the reservoir hides is nearly forgotten."""
+    for after_s in (0.3, 0.5, 0.7):
+        one = world("wristband7", seed=0)
+        one.show([14000] * moving + [4000] * (one.bubbles - moving), 0)
+        one.run(0.005)
+        one.inject_supply("supply_flat", 55e3)
+        one.run(after_s)
+        one.show([8000] * (one.bubbles - moving) + [14000] * moving, 0)
+        one.run(1.1)  # which judges
+        one.board.close()
+
+
 def test_a_fill_valve_that_stays_open_is_found(world):
     """Judged alone: a firmware that leaves one open breaks the promise of height long before."""
     world = world()

@@ -34,11 +34,12 @@ _SHOWS_PA = const(1000)  # a change that is more than noise, which is 50
 # Effort and debt are in 1/256 of the pump's full work times 1.024 ms. An open fill valve takes 23 % of that work at 60 kPa, and
 # 9 % where the reservoir has 45 and the bubble 34 kPa.
 _EFFORT_MAX = const(100000)  # 0.4 s of full work: 20 kPa
-_EFFORT_LOST = const(64)  # a quarter of it may leak away or not come: droop at rest, a weak pump
+_EFFORT_LOST = const(64)  # a quarter of it may leak away: what the droop at rest asks for
 _EFFORT_TAKEN = const(90)  # more than a fill valve takes
 _EFFORT_PER_PA = const(5)  # at 60 kPa
-_HIDDEN_TAKEN = const(60)  # what a fill valve takes from a full reservoir
-_HIDDEN_FREE_PA = const(500)  # noise, and gas that warms and cools, make true readings seem to hide up to 400
+_HIDDEN_LOST = const(32)  # an eighth of the pump's work may not come: pumps differ by ± 10 %
+_HIDDEN_TAKEN = const(54)  # what a fill valve takes of it from a full reservoir, on its way up
+_HIDDEN_FREE_PA = const(600)  # what true readings of seven bubbles seem to hide: noise, gas that warms and cools
 _DEBT_MAX = const(25000)
 _DEBT_TAKEN = const(18)  # less than a fill valve takes from a reservoir that has what is needed
 
@@ -132,7 +133,7 @@ def _balance(s: ptr32, pulses: ptr16, end: int) -> int:
         lost = 1
     s[_EFFORT] = effort
     hidden = s[_HIDDEN] + s[_UNSEEN]
-    s[_UNSEEN] = work - _EFFORT_LOST * s[_TICK_US] - taken * _HIDDEN_TAKEN >> 10
+    s[_UNSEEN] = work - _HIDDEN_LOST * s[_TICK_US] - taken * _HIDDEN_TAKEN >> 10
     if hidden < 0 or pressure < s[_NEEDED] or s[_DUMP]:
         hidden = 0
     s[_HIDDEN] = hidden
