@@ -130,3 +130,33 @@ def test_what_the_wristband_refuses_is_a_sentence(with_owner):
 )
 def test_simulated_boards_keep_the_wall_clocks_pace(url, played):
     assert in_real_time(url) == played
+
+
+@pytest.mark.slow
+def test_neighbours_lift_no_bubble_past_the_limit(with_owner):
+    async def use(owner):
+        await until(lambda: owner.state)
+        away = np.linalg.norm(owner.skin.layout.positions_mm, axis=1)
+        for peak in (9.0, 11.0, 12.5, 13.5):
+            owner.ask(peak - 0.006 * away**2)
+            await asyncio.sleep(1.5)
+            assert heights(owner).max() <= owner.skin.info.height_max_mm + 0.4
+        assert heights(owner)[0] > 12
+
+    with_owner(use, "sim://wristband19")
+
+
+@pytest.mark.slow
+def test_vent_ends_a_shape_that_is_still_thought_about(with_owner):
+    async def use(owner):
+        await until(lambda: owner.state)
+        owner.ask(np.full(19, 12.0))  # they touch: where they end takes some tenths of a second to reckon
+        await asyncio.sleep(0.02)
+        begin = time.monotonic()
+        await owner.vent()
+        assert time.monotonic() - begin < 5.0
+        for _ in range(20):
+            await asyncio.sleep(0.1)
+            assert np.all(heights(owner) < 6.0)
+
+    with_owner(use, "sim://wristband19")

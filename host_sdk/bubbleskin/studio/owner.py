@@ -17,6 +17,7 @@ from bubbleskin.device.health import Health
 from bubbleskin.device.state import State
 from bubbleskin.errors import BubbleskinError, LinkError
 from bubbleskin.sequence.model import Playable
+from bubbleskin.surface.shows import STREAM_S
 from bubbleskin.telemetry.fields import USUAL, most
 
 RATE_HZ = 20.0
@@ -26,6 +27,8 @@ HISTORY_S = 20.0
 GRACE_S = 3.0
 """Seconds without any page after which everything vents: a page that is reloaded is back sooner."""
 _RETRY_S = 1.0
+_STREAM_S = 0.05
+"""Of a change that is asked for at once: as long as the page takes for a tick."""
 _CARE_S = 0.5
 _READ_S = 6.0
 _LATENCIES = 500
@@ -75,6 +78,7 @@ class Owner:
         self._wake = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
         self._playing: asyncio.Task[None] | None = None
+        self._showing: asyncio.Task[bool] | None = None
         self._changing = asyncio.Lock()
 
     # The device.
@@ -167,6 +171,8 @@ class Owner:
         self._end_playing()
         self._wanted = None
         self.activity = ""
+        if self._showing:
+            self._showing.cancel()  # or it would be sent after a stop
 
     def _end_playing(self) -> None:
         """Nobody follows the sequence any more; the wristband ends it at what comes next."""
@@ -230,9 +236,11 @@ class Owner:
             if wanted is None or wanted is sent:
                 continue
             sent = wanted
-            # Unplanned: to reckon what neighbours do takes seconds for 19 bubbles, and would hold up stop, vent and pings.
-            done = await self._say(skin.show(wanted.heights_mm, over=wanted.over, wait=False, plan=False))
-            if done and wanted.stamp:
+            # As one of a stream: what neighbours do is reckoned beside this loop, in one step. Stop and vent end that.
+            over = min(max(wanted.over, _STREAM_S), STREAM_S)
+            self._showing = asyncio.create_task(self._say(skin.show(wanted.heights_mm, over=over, wait=False)))
+            await asyncio.wait([self._showing])
+            if not self._showing.cancelled() and self._showing.result() and wanted.stamp:
                 self.latencies.append(time.time() - wanted.stamp)
 
     async def _care(self) -> None:
