@@ -118,6 +118,8 @@ class Shows:
             begin, steps = self._begin_afresh()
         question = Compensation(begin, alone, self._limits)
         answer = await self._thought(lambda: question.answer(orders=not streams))
+        if self._kept.alone_mm is None:  # it has restarted meanwhile, which the next call is told
+            return await self.show(heights_mm, over, wait, plan)
         self._say_short(alone, answer, streams)
         steps += [np.rint(step * 1000) / 1000 for step in answer.steps]
         return await self._go(alone, steps, answer, over if streams else max(over, RAMP_S), wait)
@@ -129,6 +131,8 @@ class Shows:
         if not gaps or sequence.bubbles != len(self._layout):
             return sequence
         steps = steps_of(sequence)
+        if np.max(steps) > self._info.height_max_mm:  # which is refused, and not cut
+            return sequence
         if not gaps.apart(np.maximum(np.max(steps, axis=0), self._limits.rest_mm)):
             await self.look()
             height_mm = await self._thought(lambda: highest_cut(sequence, self._kept, self._limits))
