@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 GENERATORS := packed_schema constants nominal_table golden_vectors protocol_page cli_page boards_page state_page fault_page plant_page demo_picture membrane_pictures contact_pictures control_page control_pictures calibration_picture pattern_pictures
 EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
 QUICK := -n 2 -m "not medium and not slow and not chip" --ignore tests/house --ignore docs/calibration.md
-COVERED := tests/bench tests/boards tests/cli tests/contact tests/flash tests/native tests/sdk
+COVERED := tests/bench tests/boards tests/cli tests/contact tests/demonstrations tests/examples tests/flash tests/native tests/planner tests/plot tests/sdk tests/studio tests/sweeps
 UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
 
