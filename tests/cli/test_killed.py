@@ -18,8 +18,8 @@ import bubbleskin as bs
 RUN = [sys.executable, "-m", "bubbleskin"]
 LEAVES_A_SHAPE = {
     "show": ["show", "--all", "8", "--hold", "1e6"],
-    "show, on its way": ["show", "--all", "12", "--over", "60"],
-    "play": ["play", "pulse", "--loops", "0"],
+    "show, on its way": ["show", "--all", "9.5", "--over", "60"],
+    "play": ["play", "pulse", "--loops", "0"],  # its bubbles touch: where they end is reckoned before it begins
     "demo": ["demo", "--output", "demo.png"],
 }
 LEAVES_NOTHING = {
@@ -105,7 +105,7 @@ def test_the_next_program_is_served_and_told(board, tmp_path, caplog, verb):
     before = descriptors(server)
     arguments = (LEAVES_A_SHAPE | LEAVES_NOTHING)[verb]
     with host([*arguments, "--device", url], tmp_path) as process:
-        time.sleep(1.0)
+        time.sleep(6.0 if verb == "play" else 1.0)
         assert process.poll() is None
         helpers = children(process.pid)
         process.send_signal(signal.SIGKILL)

@@ -19,6 +19,7 @@ def studio():
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
     )
     yield process, json.loads(process.stdout.readline())
     process.kill()

@@ -6,6 +6,8 @@ from types import FrameType
 _AGAIN = 0.05  # seconds after which it is looked again whether that is over
 
 _LLVM = f"{os.sep}llvmlite{os.sep}"
+_WEAK = f"{os.sep}matplotlib{os.sep}transforms.py"
+"""Its weak references call back as objects are freed, wherever that is."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -59,7 +61,9 @@ class _CtrlC:
 
 
 def _called_by_c(frame: FrameType | None) -> bool:
-    """Whether what runs is part of an import, or of a callback from LLVM."""
+    """Whether what runs is part of an import, or a callback from LLVM or from a weak reference of matplotlib's."""
+    if frame and frame.f_code.co_name == "<lambda>" and frame.f_code.co_filename.endswith(_WEAK):
+        return True
     while frame:
         file = frame.f_code.co_filename
         if file == "<frozen importlib._bootstrap>" or _LLVM in file:
