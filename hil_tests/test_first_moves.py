@@ -3,21 +3,26 @@
 import numpy as np
 import pytest
 
+import bubbleskin as bs
+
 pytestmark = pytest.mark.timeout(60)
 
 LOW_MM = 6.5  # some 18 kPa: little air, and a bubble that is seen to rise
 
 
-def test_the_self_test_has_found_nothing(skin):
-    for _ in range(50):
-        if skin.health().self_test not in ("running", "not_run"):
-            break
-        skin.sleep(0.1)
-    health = skin.health()
-    usual = {"passed", "not_run"} if skin.simulated else {"passed"}  # simulated boards begin after it
-    assert health.self_test in usual
-    assert health.untrue_zero == health.unfilled == health.unvented == ()
-    assert health.board_faults == ()
+@pytest.mark.long
+def test_the_self_test_has_found_nothing(target):
+    """It runs at boot, and whatever is asked of the board ends it: so this only waits."""
+    with bs.connect(target) as skin:
+        for _ in range(100):
+            if skin.health().self_test != "running":
+                break
+            skin.sleep(0.1)
+        health = skin.health()
+        # Simulated boards begin after it; on another somebody may have asked for a shape in the middle of it.
+        assert health.self_test in {"passed", "skipped", *({"not_run"} if skin.simulated else ())}
+        assert health.untrue_zero == health.unfilled == health.unvented == ()
+        assert health.board_faults == ()
 
 
 def test_the_first_bubble_rises_a_little_and_comes_back(skin):
