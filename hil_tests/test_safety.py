@@ -161,9 +161,22 @@ def test_one_acknowledged_fault_leaves_the_later_ones(skin, failing):
         failing("sensor_absent", bubble, 1)
         skin.sleep(0.3)
     first = next(fault for fault in skin.fault_log() if fault.bubble == 1 and not fault.acknowledged)
-    skin.simulated.inject("sensor_absent", 1, 0)
+    for bubble in (1, 3):
+        skin.simulated.inject("sensor_absent", bubble, 0)
     skin.acknowledge(first)
     assert list(skin.faults()) == [3]
+
+
+@pytest.mark.long
+def test_an_acknowledgement_shortens_no_isolation(skin, failing):
+    skin.show(np.full(skin.info.bubbles, 8.0))
+    failing("sensor_absent", 2, 1)
+    skin.sleep(0.1)
+    (fault,) = (fault for fault in skin.fault_log() if fault.bubble == 2 and not fault.acknowledged)
+    skin.simulated.inject("sensor_absent", 2, 0)
+    skin.clear_faults()
+    assert skin.faults() == {}
+    assert skin.state().time - fault.time >= 1.0
 
 
 @pytest.mark.long
