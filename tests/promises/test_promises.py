@@ -125,3 +125,19 @@ def test_a_fault_that_goes_by_itself_is_found(ticks, world):
             world.judge_faults(well, vented)
     else:
         world.judge_faults(well, vented)
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("leak", [3e-6, 4e-6])
+def test_a_leak_of_a_high_bubble_is_not_taken_for_rubber_that_relaxes(leak, world):
+    """It would be filled up again and again: to 15.3 mm."""
+    one = world("wristband7", seed=1)
+    for wait_s in (0.7, 0.005):
+        one.show([13500] * one.bubbles, 0)
+        one.run(wait_s)
+        if wait_s > 0.1:
+            one.vent()
+            one.run(0.1)
+    one.inject("leak", 0, leak)
+    one.run(0.4)
+    assert one.faults[0]

@@ -2,8 +2,7 @@
 """Watches every bubble for what control cannot mend, and for how long it has been under pressure.
 
 `FaultMonitor.check` runs the three checks in every tick after `Bubbles.step`, on the same rows. They set fault bits, and a
-bubble that has one is isolated in the same tick, whatever control has decided. What they go by, with thresholds and measured
-times, is in docs/safety.md:
+bubble that has one is isolated in the same tick, whatever control has decided. docs/safety.md has thresholds and times:
 
 1. pressures: a *sensor* has noise, so one that always says the same is not read; the *budget* of pressure and time; and
    a *vented* line must lose its pressure.
@@ -104,6 +103,7 @@ _BUDGET = const(128)
 _DEFICIT_MAX = const(80000)  # µJ
 _SURPLUS_MAX = const(90000)
 _CLOSED_WITHIN_PA = const(700)  # a closed line keeps its pressure within, and a share of it: neighbours move
+_RELAXES_PA = const(28000)  # 12 mm: above it a leak that is taken for rubber that relaxes is filled up past the limit
 _INFLATED_PA = const(8000)  # which 4 mJ bring about
 _FLAT_MAX = const(12000)  # µJ
 _DROP_PA = const(10000)
@@ -324,7 +324,7 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                 change = pressure - watch[_CLOSED_PA]
                 # Rubber that was filled quickly relaxes, and what was let out recovers, most of it at once.
                 moved = watch[_MOVED_PA]
-                relaxed = watch[_CLOSED_PA] + (moved & ~(moved >> 31)) >> 5
+                relaxed = watch[_CLOSED_PA] + (moved & ~(moved >> 31) & watch[_CLOSED_PA] - _RELAXES_PA >> 31) >> 5
                 recovered = (watch[_CLOSED_PA] >> 6) - ((moved & moved >> 31) >> 4)
                 within = _CLOSED_WITHIN_PA + (relaxed if change < 0 else recovered)
                 if change > within or change < 0 - within:
