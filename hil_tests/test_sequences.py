@@ -16,7 +16,7 @@ def shape(skin, height_mm):
 
 def far(skin):
     """A step that no device settles in so short a time."""
-    return bs.Step(shape(skin, 12.5), 0.05, until=bs.Settled(0.05, 0.02, "hold"), name="leap")
+    return bs.Step(shape(skin, 11.0), 0.05, until=bs.Settled(0.05, 0.02, "hold"), name="leap")
 
 
 def check_schedule(skin, played, sequence):
@@ -78,7 +78,7 @@ def test_the_device_follows_the_ramp(skin):
 
 def test_a_condition_that_never_comes_ends_by_its_timeout(skin):
     with pytest.raises(
-        bs.DeviceFault, match=r"^Step 0 \(leap\) did not settle within 0.02 s: bubble.* instead of 12.50 mm"
+        bs.DeviceFault, match=r"^Step 0 \(leap\) did not settle within 0.02 s: bubble.* instead of 11.00 mm"
     ) as fault:
         skin.play(bs.Sequence([far(skin), bs.Step(shape(skin, 6.0), 0.1)]))
     assert "its shape is held" in str(fault.value)
