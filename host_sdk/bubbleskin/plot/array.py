@@ -52,12 +52,12 @@ def _above(axes, layout, state, colours):  # type: ignore[no-untyped-def]
 
 
 def _side(axes, layout, state, colours, top):  # type: ignore[no-untyped-def]
-    """The bubbles as spheres on their base, seen along y; a line where each was asked to end."""
+    """The bubbles as spheres, seen along y; a line where each was asked to end."""
     for bubble in np.argsort(-layout.positions_mm[:, 1]):
         x = layout.positions_mm[bubble, 0]
-        height = state.height_mm[bubble]
+        height, radius = state.height_mm[bubble], state.alone_mm[bubble] / 2  # a lifted one hangs above its base
         axes.add_patch(
-            Circle((x, height / 2), height / 2, facecolor=colours.to_rgba(height), edgecolor="white", lw=1.2)
+            Circle((x, height - radius), radius, facecolor=colours.to_rgba(height), edgecolor="white", lw=1.2)
         )
     for bubble, x in enumerate(layout.positions_mm[:, 0]):
         axes.hlines(

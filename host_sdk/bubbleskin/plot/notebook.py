@@ -48,7 +48,7 @@ def figure_of(shown: object) -> Figure:
 
 
 class _Spheres(NamedTuple):
-    """Bubbles as spheres that nobody lifts: all that is known of real ones."""
+    """Bubbles as spheres that nobody pushes aside: who pushes whom is not told."""
 
     height_mm: NDArray[np.float64]
     position: NDArray[np.float64]
@@ -65,8 +65,9 @@ def _(skin: Skin) -> Figure:
         bubbles = _Spheres(skin.simulated.height_mm, plant.position_m, plant.parameters.radius * plant.stretch)
         what = "true heights"
     else:
-        radius = state.height_mm / 2000
-        bubbles = _Spheres(state.height_mm, np.column_stack([skin.layout.positions_mm / 1000, radius]), radius)
+        radius = state.alone_mm / 2000
+        place = np.column_stack([skin.layout.positions_mm / 1000, state.height_mm / 1000 - radius])
+        bubbles = _Spheres(state.height_mm, place, radius)
         what = "heights as the wristband knows them"
     return _array(skin.layout, bubbles, state.target_mm, f"{skin.info.board}, {state.mode}, {state.time:.2f} s: {what}")
 
