@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bubbleskin.studio import owner as owner_module
-from bubbleskin.studio.owner import Owner, in_real_time
+from bubbleskin.studio.owner import Owner, as_asked, in_real_time
 
 FLAT_MM = 5.4
 
@@ -130,6 +130,7 @@ def test_what_the_wristband_refuses_is_a_sentence(with_owner):
 )
 def test_simulated_boards_keep_the_wall_clocks_pace(url, played):
     assert in_real_time(url) == played
+    assert in_real_time(as_asked(played)) == played
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ HISTORY_S = 20.0
 """Seconds of snapshots that a page is given when it is opened."""
 GRACE_S = 3.0
 """Seconds without any page after which everything vents: a page that is reloaded is back sooner."""
+_PACE = "realtime=1"
 _RETRY_S = 1.0
 _STREAM_S = 0.05
 """Of a change that is asked for at once: as long as the page takes for a tick."""
@@ -46,7 +47,12 @@ def in_real_time(url: str) -> str:
     """`url`, where a simulated board keeps the wall clock's pace: people look at it."""
     if url.partition("://")[0].lower() not in SIMULATED or "realtime=" in url:
         return url
-    return f"{url}{'&' if '?' in url else '?'}realtime=1"
+    return f"{url}{'&' if '?' in url else '?'}{_PACE}"
+
+
+def as_asked(url: str) -> str:
+    """`url` without the pace that `in_real_time` has given it."""
+    return url.removesuffix(_PACE).rstrip("?&") if url.endswith(_PACE) else url
 
 
 class Owner:

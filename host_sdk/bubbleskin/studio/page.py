@@ -1,6 +1,5 @@
 """One page: the bar with stop and vent, the live array, and beside it the panel that was chosen. All of it is rebuilt at will."""
 
-import re
 from collections.abc import Callable
 from typing import Protocol
 
@@ -11,6 +10,7 @@ from bubbleskin.device.state import State
 from bubbleskin.link.clock import Clock
 from bubbleskin.studio.array import Array
 from bubbleskin.studio.desk import Desk
+from bubbleskin.studio.owner import as_asked
 from bubbleskin.studio.panels.buttons import ButtonsPanel
 from bubbleskin.studio.panels.live import LivePanel, choose_device
 from bubbleskin.studio.panels.patterns import PatternPanel
@@ -119,7 +119,7 @@ class Page:
             return
         self._notice.text = owner.problem or owner.note
         self._notice.set_visibility(bool(owner.problem or owner.note))
-        self._where.text = shown(owner.url)
+        self._where.text = as_asked(owner.url)
         self._facts.say(
             doing=_doing(owner.state, owner.activity),
             supply=f"{owner.health.supply_kpa:.0f} kPa" if owner.health else "–",
@@ -145,11 +145,6 @@ class _Facts:
         for name, (fact, value) in self._values.items():
             value.text = values.get(name, "")
             fact.set_visibility(bool(values.get(name)))
-
-
-def shown(url: str) -> str:
-    """A URL without what the studio has added to it."""
-    return re.sub(r"[?&]realtime=1$", "", url)
 
 
 def _doing(state: State | None, activity: str) -> str:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:  # scipy and numba come with it, and most shapes need neither
 
 Array = NDArray[np.float64]
 
-SPRINGS_SHARE = 0.3 / 3**0.5
-"""Standard deviation of springs that nobody has measured: they are within 30 %, and any of it is as likely."""
 KICK = 2e-5
 """m. Random nudges of the others: barbs are off by so much."""
 VOLUMES_MM = 0.05
@@ -31,7 +29,6 @@ STIR_MM = 0.01
 _FOLLOWED_MM = 0.1
 """The shape is followed to told heights that differ by more; up to there its slope says enough, and noise lifts nobody."""
 _SLOPED_MM = 0.2  # by what slopes correct at most: where a shape is about to snap they say nothing
-_DOUBTED = ("kz", "kxy", "kc")
 
 
 class KeptShape:
@@ -140,14 +137,10 @@ def doubles(layout: Layout, alone_mm: Array, rest_mm: float) -> "list[HeldShape]
 
 
 def _models(layout: Layout, rest_mm: float) -> "list[CompliantContact]":
-    from bubbleskin.contact.model import CompliantContact
+    from bubbleskin.contact.model import DOUBT, CompliantContact
     from bubbleskin.membrane import YeohBalloon
 
-    balloon = YeohBalloon(radius=rest_mm / 2e3)
-    likeliest = CompliantContact(layout, balloon)
-    models = [likeliest]
-    for name in _DOUBTED:
-        for share in (1 + SPRINGS_SHARE, 1 - SPRINGS_SHARE):
-            springs = {one: getattr(likeliest, one) * (share if one == name else 1.0) for one in _DOUBTED}
-            models.append(CompliantContact(layout, balloon, **springs, kick=KICK, seed=len(models)))
-    return models
+    likeliest = CompliantContact(layout, YeohBalloon(radius=rest_mm / 2e3))
+    sd = (DOUBT - 1) / 3**0.5  # of springs of which any within the doubt is as likely
+    factors = [1 + sign * change for change in sd * np.eye(3) for sign in (1, -1)]
+    return [likeliest, *(likeliest.with_springs(one, KICK, seed) for seed, one in enumerate(factors, 1))]

@@ -8,6 +8,7 @@ from bubbleskin.fault_guide import guide
 from bubbleskin.link.serial import attached
 from bubbleskin.studio.array import Array
 from bubbleskin.studio.desk import Desk
+from bubbleskin.studio.owner import as_asked
 from bubbleskin.studio.widgets import Range, Slider, button, choice, field, text
 
 
@@ -75,19 +76,18 @@ class LivePanel:
 
 def choose_device(desk: Desk) -> None:
     """The device picker: simulated boards with their options, the ports that are found, any other URL."""
-    url = desk.owner.url
-    current = url.partition("?")[0]
+    current, _, options = as_asked(desk.owner.url).partition("?")
     choices = [(port, f"Wristband at {port}") for port in attached()]
     choices += [(f"sim://{name}", f"Simulated {name}") for name in boards.NAMES]
     if current and current not in dict(choices):
         choices.insert(0, (current, current))
-    wanted = {"device": current or choices[0][0], "options": _options(url), "other": ""}
+    wanted = {"device": current or choices[0][0], "options": options, "other": ""}
 
     def connect() -> None:
         device = wanted["other"].strip() or wanted["device"]
-        options = wanted["options"].strip().lstrip("?")
-        if device == wanted["device"] and device.startswith("sim://") and options:
-            device = f"{device}?{options}"
+        chosen = wanted["options"].strip().lstrip("?")
+        if device == wanted["device"] and device.startswith("sim://") and chosen:
+            device = f"{device}?{chosen}"
         background_tasks.create(desk.owner.open(device), name="connect")
 
     text("h2", "Wristband")
@@ -96,8 +96,3 @@ def choose_device(desk: Desk) -> None:
     field("Options of a simulated one", wanted["options"], lambda value: wanted.update(options=value), hint)
     field("Or any URL", "", lambda value: wanted.update(other=value), "/dev/ttyACM0, socket://host:7707")
     button("Connect", connect, "btn main")
-
-
-def _options(url: str) -> str:
-    """The options in `url` but the one that the studio adds itself."""
-    return "&".join(option for option in url.partition("?")[2].split("&") if not option.startswith("realtime="))
