@@ -32,12 +32,12 @@ class Line:
             self.send(data)
 
 
-def flipped(place, bit=1):
+def flipped(place):
     """`data` with one bit of the byte at `place` turned over, a share of its length; no byte becomes a frame's end."""
 
     def spoil(data):
         at = round(place * (len(data) - 3)) + 1
-        spoiled = data[at] ^ 1 << bit
+        spoiled = data[at] ^ 2
         return data[:at] + bytes([spoiled or 3]) + data[at + 1 :]
 
     return spoil

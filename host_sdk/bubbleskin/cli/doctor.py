@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bubbleskin import native
+from bubbleskin.cli import hil
 from bubbleskin.cli.options import Real, as_json, device, progress_of_parts
 from bubbleskin.connecting import connect
 from bubbleskin.errors import BubbleskinError
@@ -125,8 +126,8 @@ def _findings() -> Iterator[Finding]:
     parquet = find_spec("pyarrow") is not None
     install = "" if parquet else "pip install 'bubbleskin[parquet]'"
     yield Finding("recordings in Parquet", "installed" if parquet else "not there", install)
-    hil = all(find_spec(name) for name in ("pytest", "pytest_timeout", "pytest_html"))
-    yield Finding("bubbleskin hil", "installed" if hil else "not there", "" if hil else "pip install 'bubbleskin[hil]'")
+    needed = hil.missing()
+    yield Finding("bubbleskin hil", "not there" if needed else "installed", hil.INSTALL if needed else "")
     ports = attached()
     yield Finding("wristbands attached", ", ".join(ports) or "none", "" if ports else "sim:// needs none")
     for port in ports:

@@ -11,6 +11,7 @@ import bubbleskin
 from bubbleskin import boards
 from bubbleskin.errors import BubbleskinError
 
+INSTALL = "pip install 'bubbleskin[hil]'"
 _NEEDED = ("pytest", "pytest_timeout", "pytest_html")
 
 
@@ -38,9 +39,8 @@ def hil(devices: tuple[str, ...], only: str | None, html: Path | None, junit: Pa
     A board that has never moved is asked for little at first, and for no more where that fails. What would need a
     failure is tried on simulated targets only, and said. Status 0: all of it holds; 1: something does not.
     """
-    missing = [name for name in _NEEDED if find_spec(name) is None]
-    if missing:
-        raise BubbleskinError(f"`bubbleskin hil` needs {', '.join(missing)}: pip install 'bubbleskin[hil]'")
+    if missing():
+        raise BubbleskinError(f"`bubbleskin hil` needs {', '.join(missing())}: {INSTALL}")
     import pytest
 
     folder = suite()
@@ -61,6 +61,11 @@ def hil(devices: tuple[str, ...], only: str | None, html: Path | None, junit: Pa
     arguments += [f"--junit-xml={junit}"] if junit else []
     arguments += ["--collect-only", "-q"] if names else []
     raise SystemExit(pytest.main(arguments))
+
+
+def missing() -> list[str]:
+    """What it needs and is not installed."""
+    return [name for name in _NEEDED if find_spec(name) is None]
 
 
 def suite() -> Path:

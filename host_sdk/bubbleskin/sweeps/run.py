@@ -49,7 +49,7 @@ def sweep(
         if progress:
             progress(len(points) - len(left), len(points))
         if left:
-            workers = executor or ours.enter_context(ProcessPoolExecutor(initializer=_warm))
+            workers = executor or ours.enter_context(ProcessPoolExecutor())
             for found in _results(study, left, workers):
                 rows.add(found)
                 if progress:
@@ -98,11 +98,6 @@ def _row(task: str, options: Mapping[str, Any], point: Point) -> Row:
     except Exception as error:  # a task of one's own; one bad wristband must not take the others' rows
         row["error"] = f"{type(error).__name__}: {error}"
     return row
-
-
-def _warm() -> None:
-    """A process of its own compiles nothing that is kept, and says nothing of what is."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def describe(rows: list[Row]) -> dict[str, dict[str, float]]:
