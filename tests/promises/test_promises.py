@@ -128,16 +128,20 @@ def test_a_fault_that_goes_by_itself_is_found(ticks, world):
 
 
 @pytest.mark.medium
-@pytest.mark.parametrize("leak", [3e-6, 4e-6])
-def test_a_leak_of_a_high_bubble_is_not_taken_for_rubber_that_relaxes(leak, world):
-    """It would be filled up again and again: to 15.3 mm."""
-    one = world("wristband7", seed=1)
-    for wait_s in (0.7, 0.005):
-        one.show([13500] * one.bubbles, 0)
-        one.run(wait_s)
-        if wait_s > 0.1:
-            one.vent()
-            one.run(0.1)
+@pytest.mark.parametrize("seed", [1, 2, 236])
+@pytest.mark.parametrize("leak", [1e-6, 2e-6, 3e-6, 4e-6])
+def test_a_leak_fills_no_bubble_past_what_is_asked(leak, seed, world):
+    """A curve's error that was learned against what the pressure said made each correction worse than the one before: 15.3 mm."""
+    one = world("wristband7", seed=seed)
+    one.show([13500] * one.bubbles, 0)
+    one.run(0.7)
+    one.vent()
+    one.run(0.1)
+    one.show([13500] * one.bubbles, 0)
+    one.run(0.005)
     one.inject("leak", 0, leak)
-    one.run(0.4)
-    assert one.faults[0]
+    highest = 0.0
+    for _ in range(30):
+        one.run(0.05)
+        highest = max(highest, float(one.board.plant.height_mm[0]))
+    assert 13.0 < highest < 13.8

@@ -264,7 +264,8 @@ def correct(row: ptr32, board: ptr32, bubble: int):
         air += row[_AIR]
         row[_AIR] = air if air > 0 else 0
         gain = sd * w // (v >> 8)
-        error += gain * r >> 8
+        if gain > 0:  # never against what the pressure says: a leak would be taken for stiffer rubber
+            error += gain * r >> 8
         if error > _CURVE_SD_MAX:
             error = _CURVE_SD_MAX
         if error < 0 - _CURVE_SD_MAX:

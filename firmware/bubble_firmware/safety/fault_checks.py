@@ -103,7 +103,6 @@ _BUDGET = const(128)
 _DEFICIT_MAX = const(80000)  # µJ
 _SURPLUS_MAX = const(90000)
 _CLOSED_WITHIN_PA = const(700)  # a closed line keeps its pressure within, and a share of it: neighbours move
-_RELAXES_PA = const(28000)  # 12 mm: above it a leak that is taken for rubber that relaxes is filled up past the limit
 _INFLATED_PA = const(8000)  # which 4 mJ bring about
 _FLAT_MAX = const(12000)  # µJ
 _DROP_PA = const(10000)
@@ -324,7 +323,7 @@ def check_lines(row: ptr32, watch: ptr32, limits: ptr32, board: ptr32, pulses: p
                 change = pressure - watch[_CLOSED_PA]
                 # Rubber that was filled quickly relaxes, and what was let out recovers, most of it at once.
                 moved = watch[_MOVED_PA]
-                relaxed = watch[_CLOSED_PA] + (moved & ~(moved >> 31) & watch[_CLOSED_PA] - _RELAXES_PA >> 31) >> 5
+                relaxed = watch[_CLOSED_PA] + (moved & ~(moved >> 31)) >> 5
                 recovered = (watch[_CLOSED_PA] >> 6) - ((moved & moved >> 31) >> 4)
                 within = _CLOSED_WITHIN_PA + (relaxed if change < 0 else recovered)
                 if change > within or change < 0 - within:
