@@ -16,6 +16,7 @@ from bubbleskin.bench.control.measure import rows_of
 from bubbleskin.bench.control.plants import KINDS, REAL, kind_named, sheet
 from bubbleskin.bench.control.runs import HOLDS, SEARCH, STEP, TO_AND_FRO, Job, Outcome, run, to_and_fro
 from bubbleskin.bench.control.shows import hold
+from bubbleskin.bench.rows import Row
 from bubbleskin.cli.bench import bench
 from bubbleskin.errors import InvalidInput
 
@@ -130,8 +131,12 @@ def figures():
 @pytest.mark.medium
 def test_the_page_shows_the_file_and_check_says_where_not(tmp_path):
     (tmp_path / "docs/data").mkdir(parents=True)
-    (tmp_path / page.PAGE).write_text(f"before\n{page.BEGIN}old\n{page.END}after\n", encoding="utf-8")
-    page.write(tmp_path, figures())
+    for path in (page.PAGE, page.TOPS_PAGE):
+        (tmp_path / path).write_text(f"before\n{page.BEGIN}old\n{page.END}after\n", encoding="utf-8")
+    page.write(tmp_path, figures(), [Row("touching, a shape: RMS", 0.1234, "mm", "≤ 0.15"), Row("shows", 120, "")])
+    tops = (tmp_path / page.TOPS_PAGE).read_text(encoding="utf-8")
+    assert "| a shape: RMS | 0.12 mm | ≤ 0.15 |\n| shows | 120 |  |\n" in tops
+    assert "old" not in tops
     text = (tmp_path / page.PAGE).read_text(encoding="utf-8")
     assert text.startswith("before\n")
     assert text.endswith("after\n")
@@ -143,6 +148,10 @@ def test_the_page_shows_the_file_and_check_says_where_not(tmp_path):
     page.check(tmp_path)
     (tmp_path / page.PAGE).write_text(text.replace("never", "0.90"), encoding="utf-8")
     with pytest.raises(InvalidInput, match="does not show the figures"):
+        page.check(tmp_path)
+    page.write(tmp_path, figures(), [])
+    (tmp_path / page.TOPS_PAGE).write_text(tops, encoding="utf-8")
+    with pytest.raises(InvalidInput, match=r"contact\.md does not show the figures"):
         page.check(tmp_path)
 
 

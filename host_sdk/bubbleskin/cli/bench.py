@@ -48,7 +48,9 @@ class OfControl(NamedTuple):
     help="control: the share of its sheets.",
 )
 @click.option("--seed", type=SEED, default=1, show_default=True, help="control: of its first sheet.")
-@click.option("--write", is_flag=True, help="control: write its figures into docs/control.md of this folder.")
+@click.option(
+    "--write", is_flag=True, help="control: write its figures into docs/control.md and docs/contact.md of this folder."
+)
 @click.option("--check", is_flag=True, help="control: measure nothing; fail if that page does not show those figures.")
 @as_json
 @gathered(control=OfControl)
@@ -106,7 +108,7 @@ def _of_control(asked: OfControl, console: Console) -> list[Row]:
         status.update("bubbles that touch …")
         others = list(touching.rows(asked.size, asked.seed))
     if root:
-        page.write(root, found)
+        page.write(root, found, others)
     return [row for one in found for row in measure.rows_of(one)] + others
 
 

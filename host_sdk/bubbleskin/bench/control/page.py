@@ -1,4 +1,4 @@
-"""The figures as a file, and as the tables of `docs/control.md` that are made of it."""
+"""The figures as files, and as the tables of `docs/control.md` and `docs/contact.md` that are made of them."""
 
 import json
 import math
@@ -13,29 +13,37 @@ from bubbleskin.bench.control.measure import FILL_GOAL, LONG_GOAL_MM, OVERSHOOT_
 from bubbleskin.bench.control.plants import KINDS, Kind
 from bubbleskin.bench.control.runs import HOLDS, LONG, SEARCH, STEP, TO_AND_FRO
 from bubbleskin.bench.control.shows import TIMES_S
+from bubbleskin.bench.rows import Row
 from bubbleskin.errors import InvalidInput
 
 DATA = Path("docs/data/control.json")
 PAGE = Path("docs/control.md")
+TOPS_DATA = Path("docs/data/tops.json")
+"""Of bubbles that touch."""
+TOPS_PAGE = Path("docs/contact.md")
 BEGIN, END = "<!-- figures: made by bubbleskin bench control --write -->\n", "<!-- end of figures -->\n"
 _DIGITS = 4
 
 _Entry = dict[str, Any]
 
 
-def write(root: Path, figures: Iterable[Figures]) -> None:
-    """Write `figures` into the repository at `root`, and the page that shows them."""
+def write(root: Path, figures: Iterable[Figures], tops: Iterable[Row]) -> None:
+    """Write `figures`, and `tops` of bubbles that touch, into the repository at `root`, and the pages that show them."""
     files.write_text(root / DATA, text_of(figures), "the control bench's figures")
     files.write_text(root / PAGE, page(root), "the page of control")
+    lines = [json.dumps(_rounded(row), ensure_ascii=False) for row in tops]
+    files.write_text(root / TOPS_DATA, "[\n" + ",\n".join(lines) + "\n]\n", "the figures of tops")
+    files.write_text(root / TOPS_PAGE, tops_page(root), "the page of contact")
 
 
 def check(root: Path) -> None:
-    """`InvalidInput` where the page does not show the figures in the file."""
-    if files.read_text(root / PAGE, "the page of control") != page(root):
-        raise InvalidInput(
-            f"{PAGE} does not show the figures of {DATA}: run `bubbleskin bench control --write`, or "
-            "`python tools/generate/control_page.py` where they need not be measured again."
-        )
+    """`InvalidInput` where a page does not show the figures in its file."""
+    for path, data, made in ((PAGE, DATA, page), (TOPS_PAGE, TOPS_DATA, tops_page)):
+        if files.read_text(root / path, "the page") != made(root):
+            raise InvalidInput(
+                f"{path} does not show the figures of {data}: run `bubbleskin bench control --write`, or "
+                "`python tools/generate/control_page.py` where they need not be measured again."
+            )
 
 
 def text_of(figures: Iterable[Figures]) -> str:
@@ -46,10 +54,23 @@ def text_of(figures: Iterable[Figures]) -> str:
 
 def page(root: Path) -> str:
     """The page with the tables of the file's figures."""
-    text = files.read_text(root / PAGE, "the page of control")
     entries = files.parse_json(files.read_text(root / DATA, "the control bench's figures"), str(DATA))
-    before, rest = text.split(BEGIN)
-    return before + BEGIN + "\n" + _tables(entries) + "\n" + END + rest.split(END)[1]
+    return _shown(root / PAGE, _tables(entries))
+
+
+def tops_page(root: Path) -> str:
+    """The page of contact with the figures of tops."""
+    rows = files.parse_json(files.read_text(root / TOPS_DATA, "the figures of tops"), str(TOPS_DATA))
+    lines = ["| what | value | target |", "|---|---|---|"]
+    for name, value, unit, target in rows:
+        number = f"{value:g}" if value == int(value) else f"{value:.2f}" if value < 10 else f"{value:.1f}"
+        lines.append(_row([name.removeprefix("touching, "), f"{number} {unit}".rstrip(), target]))
+    return _shown(root / TOPS_PAGE, "\n".join(lines) + "\n")
+
+
+def _shown(path: Path, tables: str) -> str:
+    before, rest = files.read_text(path, "the page").split(BEGIN)
+    return before + BEGIN + "\n" + tables + "\n" + END + rest.split(END)[1]
 
 
 def _rounded(value: Any) -> Any:

@@ -1,15 +1,18 @@
-"""Bubbles that touch: true tops of the firmware with the host's shows, planned and raw, on calibrated sheets of real rubber."""
+"""Bubbles that touch: true tops of the firmware with the host's shows, planned and raw, and what a show costs."""
 
 import logging
+import time
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bubbleskin import boards
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.bench.control.contenders import CONDITIONED_MM
-from bubbleskin.bench.control.plants import BOARD, REAL, sheet
+from bubbleskin.bench.control.plants import BOARD, KINDS, REAL, Kind, sheet
 from bubbleskin.bench.rows import Row, share_of
+from bubbleskin.connecting import connect
 from bubbleskin.errors import DeviceFault
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim.board import SimulatedBoard
@@ -21,6 +24,8 @@ Array = NDArray[np.float64]
 _SHEETS, _SHAPES, _WILD, _FRAMES = 6, 6, 20, 240
 """Sheets at full size; of each shapes that can be had, random heights that mostly cannot, frames of a stream."""
 _HERTZ = 30.0
+IDEAL = KINDS[0]
+_FRAME_MS = {"wristband7": "≤ 10", "wristband19": "≤ 20"}
 _FLAT_S, _STAND_S = 1.5, 1.0
 _LEAST_MM = 0.1  # of lift, for a shape to count as one of bubbles that touch
 _WAITS_S = 4.0
@@ -28,39 +33,56 @@ _LOOK_S = 0.05
 
 
 def rows(size: float = 1.0, seed: int = 1) -> Iterator[Row]:
-    """Shapes that the same sheet has had, asked again; a hill under a pointer; random heights against the limit."""
+    """Of ideal and real rubber: shapes that the same sheet has had, asked again; a hill under a pointer; random heights
+    against the limit. Then the processor time of one frame of a hill on both boards.
+    """
+    quiet = logging.getLogger("bubbleskin.surface")
+    before = quiet.level
+    quiet.setLevel(logging.ERROR)  # what cannot be had is counted, not said
+    try:
+        for kind in (IDEAL, REAL):
+            yield from _of_kind(kind, size, seed)
+        for board in boards.NAMES:
+            costs = 1e3 * np.array([cost for cost, _ in _stream(connect(f"sim://{board}"), share_of(_FRAMES, size))])
+            name = f"touching, {board}, a frame of a stream of 30 Hz: processor time"
+            yield Row(f"{name}, median", float(np.median(costs)), "ms", _FRAME_MS.get(board, ""))
+            yield Row(f"{name}, 99 of 100 within", float(np.percentile(costs, 99)), "ms")
+    finally:
+        quiet.setLevel(before)
+
+
+def _of_kind(kind: Kind, size: float, seed: int) -> Iterator[Row]:
     planned: list[Array] = []
     raw: list[Array] = []
     streamed: list[Array] = []
     tops: list[float] = []
-    logging.getLogger("bubbleskin.surface").setLevel(logging.ERROR)  # what cannot be had is counted, not said
     for number in range(share_of(_SHEETS, size)):
-        skin = _connected(seed + number)
+        skin = _connected(kind, seed + number)
         rng = np.random.default_rng((seed + number, *b"touching"))
         for had in _shapes(skin, rng, share_of(_SHAPES, size)):
             for plan, errors in ((True, planned), (False, raw)):
                 if _shown(skin, had, plan):
                     errors.append(_truth(skin) - had)
-        streamed += _stream(skin, share_of(_FRAMES, size))
+        streamed += [off for _, off in _stream(skin, share_of(_FRAMES, size))]
         tops += [_highest(skin, rng) for _ in range(share_of(_WILD, size))]
         skin.close()
     limit = skin.info.height_max_mm
     for name, errors, rms, most in (
-        ("shapes that can be had, show", planned, "≤ 0.15", "≤ 0.5"),
-        ("shapes that can be had, plan=False", raw, "", ""),
+        (f"{len(planned)} shapes that can be had, show", planned, "≤ 0.15", "≤ 0.5"),
+        ("the same, plan=False", raw, "", ""),
         ("a stream of 30 Hz, show", streamed, "≤ 0.2", ""),
     ):
         if errors:
             off = np.concatenate(errors)
-            yield Row(f"touching, {REAL.name}, {name}: RMS", float(np.sqrt(np.mean(off**2))), "mm", rms)
-            yield Row(f"touching, {REAL.name}, {name}: most", float(np.abs(off).max()), "mm", most)
-    yield Row(f"touching, {REAL.name}, {len(tops)} random shows: highest top", max(tops), "mm", f"≤ {limit:g}")
+            yield Row(f"touching, {kind.name}, {name}: RMS", float(np.sqrt(np.mean(off**2))), "mm", rms)
+            yield Row(f"touching, {kind.name}, {name}: most", float(np.abs(off).max()), "mm", most)
+    yield Row(f"touching, {kind.name}, {len(tops)} random shows: highest top", max(tops), "mm", f"≤ {limit:g}")
     above = sum(top > limit for top in tops)
-    yield Row(f"touching, {REAL.name}, {len(tops)} random shows: above {limit:g} mm", above, "", "0")
+    yield Row(f"touching, {kind.name}, {len(tops)} random shows: above {limit:g} mm", above, "", "0")
 
 
-def _connected(seed: int) -> Skin:
-    one = sheet(REAL, seed)
+def _connected(kind: Kind, seed: int) -> Skin:
+    one = sheet(kind, seed)
     board = SimulatedBoard(BOARD, seed=seed, parameters=one.parameters)
     board.plant.soften(CONDITIONED_MM)
     skin = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, f"sim://{BOARD}"), 2.0, simulated=board)))
@@ -110,18 +132,21 @@ def _shown(skin: Skin, heights: Array, plan: bool) -> bool:
     return True
 
 
-def _stream(skin: Skin, frames: int) -> Iterator[Array]:
-    """A hill, steep enough to be lifted by its flanks, that goes about under a pointer; errors of each frame."""
+def _stream(skin: Skin, frames: int) -> Iterator[tuple[float, Array]]:
+    """A hill, steep enough to be lifted by its flanks, that goes about under a pointer: of each frame what its `show` cost, s,
+    and how far the tops are off, (n,) mm."""
     x, y = skin.layout.positions_mm.T
     _flat(skin)
     skin.show(np.full(len(x), 6.0))
     for frame in range(frames):
         at = 8 * np.cos(frame / 25), 8 * np.sin(frame / 17)
         hill = 6 + 6 * np.exp(-((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2 * 8**2))
+        begin = time.process_time()
         skin.show(hill, over=1 / _HERTZ, wait=False)
+        cost = time.process_time() - begin
         skin.sleep(1 / _HERTZ)
         if frame > _HERTZ:
-            yield _truth(skin) - hill
+            yield cost, _truth(skin) - hill
 
 
 def _highest(skin: Skin, rng: np.random.Generator) -> float:
