@@ -25,7 +25,8 @@ _SHEETS, _SHAPES, _WILD, _FRAMES = 6, 6, 20, 240
 """Sheets at full size; of each shapes that can be had, random heights that mostly cannot, frames of a stream."""
 _HERTZ = 30.0
 IDEAL = KINDS[0]
-_FRAME_MS = {"wristband7": "≤ 10", "wristband19": "≤ 20"}
+_FRAME_MS = {7: "≤ 10", 19: "≤ 20"}
+"""By the number of bubbles."""
 _FLAT_S, _STAND_S = 1.5, 1.0
 _LEAST_MM = 0.1  # of lift, for a shape to count as one of bubbles that touch
 _WAITS_S = 4.0
@@ -43,9 +44,10 @@ def rows(size: float = 1.0, seed: int = 1) -> Iterator[Row]:
         for kind in (IDEAL, REAL):
             yield from _of_kind(kind, size, seed)
         for board in boards.NAMES:
-            costs = 1e3 * np.array([cost for cost, _ in _stream(connect(f"sim://{board}"), share_of(_FRAMES, size))])
+            skin = connect(f"sim://{board}")
+            costs = 1e3 * np.array([cost for cost, _ in _stream(skin, share_of(_FRAMES, size))])
             name = f"touching, {board}, a frame of a stream of 30 Hz: processor time"
-            yield Row(f"{name}, median", float(np.median(costs)), "ms", _FRAME_MS.get(board, ""))
+            yield Row(f"{name}, median", float(np.median(costs)), "ms", _FRAME_MS.get(skin.info.bubbles, ""))
             yield Row(f"{name}, 99 of 100 within", float(np.percentile(costs, 99)), "ms")
     finally:
         quiet.setLevel(before)
