@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
+from bubbleskin.bench.control import touching
 
 CROWDED = "sim://wristband7"
 LIFTED = np.array([12.5, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0])
-ORDERED = np.array([13.9, 11.88, 11.88, 11.88, 11.88, 11.88, 11.88])
+ORDERED = np.array([12.6, 11.0, 11.0, 11.0, 11.0, 11.0, 11.0])
 """Only with the middle first, and then by one who knows what the others do to it."""
 
 
@@ -20,7 +21,9 @@ def skin():
         yield skin
 
 
-@pytest.mark.parametrize("asked", [LIFTED, ORDERED, np.linspace(6.0, 13.5, 7)], ids=["lifted", "ordered", "stairs"])
+@pytest.mark.parametrize(
+    "asked", [LIFTED, ORDERED, np.linspace(6.0, 13.0, 7).round(3)], ids=["lifted", "ordered", "stairs"]
+)
 def test_tops_are_where_they_were_asked(skin, asked):
     state = skin.show(asked)
     assert skin.simulated.height_mm == pytest.approx(asked, abs=0.15)
@@ -51,7 +54,7 @@ def test_planned_is_nearer_than_raw(rubber):
             skin.show(rng.uniform(7.0, 12.5, 7), over=0.5, wait=False, plan=False)
             skin.sleep(1.5)
             had = skin.simulated.height_mm.copy()
-            if had.max() > 13.5 or np.abs(had - skin.simulated.alone_mm).max() < 0.3:
+            if had.max() > 13.0 or np.abs(had - skin.simulated.alone_mm).max() < 0.3:
                 continue
             for plan, errors in off.items():
                 flat(skin)
@@ -71,7 +74,11 @@ def flat(skin):
         skin.clear_faults()
 
 
-@pytest.mark.parametrize("asked", [np.full(7, 12.0), np.full(7, 14.0), [14.0, *[13.0] * 6]], ids=["12", "14", "peak"])
+@pytest.mark.parametrize(
+    "asked",
+    [np.full(7, 12.0), np.full(7, 14.0), [14.0, *[13.0] * 6], [13.9, *[11.88] * 6]],
+    ids=["12", "14", "peak", "18.2 when raw"],
+)
 def test_no_top_passes_the_limit_and_that_is_said(skin, asked, caplog):
     highest = 0.0
     with caplog.at_level(logging.WARNING, "bubbleskin"):
@@ -86,6 +93,13 @@ def test_no_top_passes_the_limit_and_that_is_said(skin, asked, caplog):
     assert not state.settled
     assert state.arrived
     assert state.target_mm == pytest.approx(np.asarray(asked))
+
+
+@pytest.mark.slow
+def test_no_random_show_of_a_calibrated_wristband_passes_the_limit():
+    """Of sheets and springs that differ, ideal and real rubber: heights that mostly cannot be had, one after the other."""
+    above = [row for row in touching.rows(0.4, seed=101) if "random shows: above" in row.name]
+    assert [row.value for row in above] == [0, 0]
 
 
 def test_apart_the_bytes_are_those_of_raw_heights():
@@ -154,6 +168,38 @@ def test_who_comes_to_an_inflated_wristband_is_not_told_what_nobody_knows(skin):
     shown = other.show(LIFTED)
     assert np.isfinite(shown.sd_mm).all()
     assert skin.simulated.height_mm == pytest.approx(LIFTED, abs=0.2)
+
+
+def lowest(skin, asked, seconds=2.0):
+    """The lowest that each bubble truly was alone while this was shown, mm."""
+    skin.show(asked, wait=False)
+    low = skin.simulated.alone_mm
+    for _ in range(round(seconds / 0.05)):
+        skin.sleep(0.05)
+        low = np.minimum(low, skin.simulated.alone_mm)
+    return low
+
+
+def test_bubbles_that_were_pressed_for_long_go_flat_before_the_next_shape_that_touches(skin, caplog):
+    """A device takes a neighbour's push for the pressure of its rubber, and knows a bubble again that has been flat."""
+    other = np.array([11.0, 10.4, 10.4, 8.0, 5.5, 5.5, 5.5])
+    skin.show([10.4, 10.8, 5.5, 5.5, 5.5, 5.5, 5.5])
+    assert lowest(skin, other)[:2].min() > 10.0
+    skin.sleep(4.0)
+    with caplog.at_level(logging.INFO, "bubbleskin"):
+        low = lowest(skin, other - 0.2)
+    assert low[:3].max() < skin.info.height_rest_mm + 0.1
+    assert low[4:].min() > 5.2
+    assert skin.simulated.height_mm == pytest.approx(other - 0.2, abs=0.15)
+    assert caplog.messages == ["Neighbours have pressed bubbles 0, 1 and 2 for long: flat first, to be measured anew."]
+    assert lowest(skin, other)[:3].min() > 10.0
+
+
+def test_bubbles_apart_never_go_flat_first(skin):
+    for height in (9.0, 9.4):
+        skin.show([height] * 7)
+        skin.sleep(6.0)
+    assert lowest(skin, [9.0] * 7).min() > 8.8
 
 
 def test_vent_forgets_who_lifted_whom(skin):

@@ -206,7 +206,7 @@ def load(name: str, seconds: float) -> Load:
     for _ in skin.telemetry(50):
         states += 1
         if board.time >= due:
-            skin.show(rng.uniform(5.5, 12.5, n), wait=False)
+            skin.show(rng.uniform(5.5, 12.5, n), wait=False, plan=False)
             due += 0.05
         if board.time >= end:
             break

@@ -45,6 +45,6 @@ def _speed(url: str, moving: bool, seconds: float) -> float:
         begin, cpu = board.time, time.process_time()
         while board.time - begin < seconds:
             if moving:
-                skin.show(rng.uniform(5.5, 12.5, len(skin.layout)), wait=False)
+                skin.show(rng.uniform(5.5, 12.5, len(skin.layout)), wait=False, plan=False)
             skin.sleep(min(_EVERY, seconds))
         return (board.time - begin) / (time.process_time() - cpu)

@@ -29,6 +29,7 @@ _LONGEST_MM = 1.0  # of one Newton step, of a height alone
 _ITERATIONS = 12
 _PEAK_MM = 0.3
 _FINEST_SHARE = 0.02  # of a way towards what cannot be had
+_LOWERINGS = 3
 _WORTH = 0.03  # an iteration that takes off less of the squared error is the last
 
 
@@ -69,8 +70,10 @@ class Compensation:
                 return best
         if best is None or self._worth(best) > SHORT_MM + 0.1:
             safe = self._held_back()
-            if best is None or self._worth(safe) < self._worth(best):
-                return safe
+            for found in (self._lowered(orders), best):
+                if found and self._worth(found) < self._worth(safe):
+                    safe = found
+            return safe
         return best
 
     def _new(self, ways: Iterator[tuple[Array, ...]]) -> Iterator[tuple[Array, ...]]:
@@ -215,6 +218,22 @@ class Compensation:
             if not self._limits.keeps(members, step):
                 return None
         return Answer(steps, members[0].height_mm, members)
+
+    def _lowered(self, orders: bool) -> Answer | None:
+        """With tops asked lower where they would pass their limit, by as much as they do; None where that does not help."""
+        asked = self._asked
+        for _ in range(_LOWERINGS):
+            lower = Compensation(self._members, asked, self._limits)
+            end = lower._newton(asked)
+            for steps in ((end,), *(lower._orders(end) if orders else ())):
+                found = lower._follow(steps)
+                if found:
+                    return found
+            passed = self._limits.passed_mm(self._let_go(end).members)
+            if not passed.any():
+                return None
+            asked = asked - passed
+        return None
 
     def _held_back(self) -> Answer:
         """As far towards the asked as the limits let it: from where no two bubbles touch, the best share of the way."""

@@ -31,8 +31,6 @@ _MANY = 200
 _OTHERS = (2, 4)
 """Those of the others in which bubbles are lifted most: softer necks."""
 _FINEST_MM = 0.1
-_SPARE_MM = 0.5
-"""What lifted tops stay below the limit: bubbles that go fast slide past where they come to rest."""
 
 
 def steps_of(sequence: Sequence) -> list[Array]:
@@ -82,7 +80,6 @@ def _cut(targets: Any, height_mm: float) -> list[float | None] | None:
 
 def _stays_below(steps: list[Array], height_mm: float, kept: KeptShape, limits: Limits) -> bool:
     members = list(_followed(kept, len(steps)))
-    limits = limits.lowered(_SPARE_MM)
     return all(limits.keeps(members, limits.clip(np.minimum(step, height_mm))) for step in steps)
 
 

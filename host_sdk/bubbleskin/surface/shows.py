@@ -23,6 +23,7 @@ from bubbleskin.surface.gaps import Gaps
 from bubbleskin.surface.kept import KeptShape
 from bubbleskin.surface.limits import Limits
 from bubbleskin.surface.played import cut, highest_cut, steps_of
+from bubbleskin.surface.pressed import Flags, Pressed
 from bubbleskin.surface.told import told
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ class Shows:
         gaps = Gaps(layout, info.height_max_mm if touch else 0.0)
         self._limits = Limits(gaps, info.height_rest_mm, info.height_max_mm)
         self._kept = KeptShape(layout, gaps, info.height_rest_mm)
+        self._pressed = Pressed(gaps, len(layout))
         self._steps: list[Array] = []  # heights alone that were sent and are not passed, the last included
         self._asked: Array | None = None  # the tops that they are to give; None: nobody asked for tops
         self._leg: _Leg | None = None  # of the last show, and whether its end has been seen
@@ -93,6 +95,7 @@ class Shows:
         """A session has been opened: with another boot, what was kept is of the past."""
         if info.boot_id != self._info.boot_id:
             self._kept.forget()
+            self._pressed = Pressed(self._limits.gaps, len(self._layout))
             self.unasked()
         self._info = info
 
@@ -114,8 +117,9 @@ class Shows:
             await self.look()
         self._catch_up()
         begin, steps = self._kept.begun(), list[Array]()
-        if not self._kept.known:
-            begin, steps = self._begin_afresh()
+        lost = self._pressed.lost(self._link.transport.now()) & (not streams)
+        if lost.any() or not self._kept.known:
+            begin, steps = self._begin_afresh(lost)
         question = Compensation(begin, alone, self._limits)
         answer = await self._thought(lambda: question.answer(orders=not streams))
         if self._kept.alone_mm is None:  # it has restarted meanwhile, which the next call is told
@@ -146,6 +150,7 @@ class Shows:
                 sequence = cut(sequence, height_mm)
                 steps = steps_of(sequence)
         self._steps = steps
+        self._pressed.reach(np.max(steps, axis=0), self._link.transport.now())
         return sequence
 
     async def _go(self, asked: Array, steps: list[Array], answer: Answer, over: float, wait: bool) -> State | None:
@@ -175,6 +180,7 @@ class Shows:
     def _note(self, steps: list[Array], asked: Array | None) -> None:
         self._steps, self._asked, self._leg, self._seen = list(steps), asked, None, False
         self._looked = None
+        self._pressed.reach(np.max(steps, axis=0), self._link.transport.now())
 
     def _catch_up(self) -> None:
         """Take the way that was sent last for gone, as far as it has been seen or its time has passed."""
@@ -188,17 +194,24 @@ class Shows:
         else:
             self._kept.go(leg.alone_at(now))
 
-    def _begin_afresh(self) -> "tuple[list[HeldShape], list[Array]]":
-        """Nobody knows on which way the bubbles came: they go apart first."""
+    def _begin_afresh(self, lost: Flags) -> "tuple[list[HeldShape], list[Array]]":
+        """Nobody knows on which way the bubbles came, or how large some have become: they go apart first, the `lost` flat."""
         where = self._kept.alone_mm
         assert where is not None
-        apart = self._limits.gaps.separated(where)
-        _log.warning(
-            "Bubbles that may touch stood there before this program came, and nobody knows who lifts whom: they go apart first."
-        )
+        if lost.any():
+            names = self._layout.names(np.flatnonzero(lost).tolist())
+            _log.info("Neighbours have pressed %s for long: flat first, to be measured anew.", names)
+        if not self._kept.known:
+            _log.warning(
+                "Bubbles that may touch stood there before this program came, and nobody knows who lifts whom: "
+                "they go apart first."
+            )
+        apart = np.where(lost, self._limits.rest_mm, self._limits.gaps.separated(where))
+        self._pressed.flat(lost)
         fresh = KeptShape(self._layout, self._limits.gaps, self._limits.rest_mm)
         fresh.go(apart)
-        return fresh.begun(), [np.rint(apart * 1000) / 1000]
+        step = np.rint(apart * 1000) / 1000
+        return fresh.begun(), [step] * (2 if lost.any() else 1)  # twice: it is flat for a while, to be measured
 
     async def _thought(self, think: Callable[[], _T]) -> _T:
         """What `think` comes to; an event loop goes on meanwhile."""
@@ -226,6 +239,9 @@ class Shows:
         """The state of tops, of what a device believes of each bubble by itself."""
         if not self._limits.gaps or np.isnan(state.alone_mm).any():
             return state
+        now = self._link.transport.now()
+        self._pressed.flat(np.array([status == "resting" for status in state.status]))
+        self._pressed.reach(state.alone_mm, now)
         ours = self._pass_steps(state.target_mm)
         kept = self._follow(state.alone_mm, ours, moves="moving" in state.status)
         asked = self._asked if ours and self._asked is not None else None
