@@ -13,8 +13,8 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 TOKEN = "the-token-of-these-tests"
 
 
-def until(true, seconds=8.0):
-    """Wait until `true()`, at most so long; what it said last."""
+def until(true, seconds=30.0):
+    """Wait until `true()`, at most so long; what it said last. Where the machine is busy, simulated time slips."""
     end = time.monotonic() + seconds
     while not (said := true()) and time.monotonic() < end:
         time.sleep(0.02)

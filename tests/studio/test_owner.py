@@ -30,7 +30,7 @@ def with_owner(in_a_loop):
     return run
 
 
-async def until(true, seconds=5.0):
+async def until(true, seconds=30.0):
     end = time.monotonic() + seconds
     while not true() and time.monotonic() < end:
         await asyncio.sleep(0.01)

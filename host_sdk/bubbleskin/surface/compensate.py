@@ -5,6 +5,7 @@ leads there from the shape that is kept, following it says. What cannot be had b
 """
 
 from collections.abc import Iterator
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -69,11 +70,9 @@ class Compensation:
             if best and self._worth(best) <= _SAME_MM:
                 return best
         if best is None or self._worth(best) > SHORT_MM + 0.1:
-            safe = self._held_back()
-            for found in (self._lowered(orders), best):
-                if found and self._worth(found) < self._worth(safe):
-                    safe = found
-            return safe
+            other = (self._lowered() if orders else None) or self._held_back()
+            if best is None or self._worth(other) < self._worth(best):
+                return other
         return best
 
     def _new(self, ways: Iterator[tuple[Array, ...]]) -> Iterator[tuple[Array, ...]]:
@@ -219,13 +218,13 @@ class Compensation:
                 return None
         return Answer(steps, members[0].height_mm, members)
 
-    def _lowered(self, orders: bool) -> Answer | None:
+    def _lowered(self) -> Answer | None:
         """With tops asked lower where they would pass their limit, by as much as they do; None where that does not help."""
         asked = self._asked
         for _ in range(_LOWERINGS):
             lower = Compensation(self._members, asked, self._limits)
             end = lower._newton(asked)
-            for steps in ((end,), *(lower._orders(end) if orders else ())):
+            for steps in ((end,), *islice(lower._orders(end), 2)):
                 found = lower._follow(steps)
                 if found:
                     return found

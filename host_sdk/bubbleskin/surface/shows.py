@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bubbleskin.device.health import Health
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State
-from bubbleskin.errors import DeviceFault
+from bubbleskin.errors import DeviceFault, DeviceRestarted
 from bubbleskin.fault_guide import remedies
 from bubbleskin.layout import Layout
 from bubbleskin.link.link import Link
@@ -122,8 +122,11 @@ class Shows:
             begin, steps = self._begin_afresh(lost)
         question = Compensation(begin, alone, self._limits)
         answer = await self._thought(lambda: question.answer(orders=not streams))
-        if self._kept.alone_mm is None:  # it has restarted meanwhile, which the next call is told
-            return await self.show(heights_mm, over, wait, plan)
+        if self._kept.alone_mm is None:
+            raise DeviceRestarted(
+                f"The wristband at {self._link.transport.name} has restarted while its shape was reckoned, and vents. "
+                "Nothing was sent; send what you still want."
+            )
         self._say_short(alone, answer, streams)
         steps += [np.rint(step * 1000) / 1000 for step in answer.steps]
         return await self._go(alone, steps, answer, over if streams else max(over, RAMP_S), wait)
