@@ -106,7 +106,8 @@ class Skin(Pictured):
 
         Where neighbours would touch, what is sent makes up for what they do, in several steps where order counts, over 0.4 s
         at least; a shape that cannot be had, or would pass the limit, becomes the nearest that was found, and that is
-        logged. A show that does not wait and takes 0.25 s or less is one of a stream: one step, from the shape before.
+        logged. Bubbles that may have touched others for 5 s or more go flat first, as only then they are known again.
+        A show that does not wait and takes 0.25 s or less is one of a stream: one step, from the shape before.
         `plan=False` sends the heights as they are, each for a bubble by itself: neighbours may then lift one above the limit.
         """
         return run_sync(self._skin.show(heights_mm, over, wait, plan, fill=fill))

@@ -13,6 +13,8 @@ CROWDED = "sim://wristband7"
 LIFTED = np.array([12.5, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0])
 ORDERED = np.array([12.6, 11.0, 11.0, 11.0, 11.0, 11.0, 11.0])
 """Only with the middle first, and then by one who knows what the others do to it."""
+HELD_MM = 0.1
+"""What a wristband holds heights to."""
 
 
 @pytest.fixture
@@ -98,8 +100,9 @@ def test_no_top_passes_the_limit_and_that_is_said(skin, asked, caplog):
 @pytest.mark.slow
 def test_no_random_show_of_a_calibrated_wristband_passes_the_limit():
     """Of sheets and springs that differ, ideal and real rubber: heights that mostly cannot be had, one after the other."""
-    above = [row for row in touching.rows(0.4, seed=101) if "random shows: above" in row.name]
-    assert [row.value for row in above] == [0, 0]
+    highest = [row.value for row in touching.rows(0.4, seed=101) if "random shows: highest top" in row.name]
+    assert len(highest) == 2
+    assert max(highest) <= 14.0 + HELD_MM
 
 
 def test_apart_the_bytes_are_those_of_raw_heights():
