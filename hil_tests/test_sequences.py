@@ -63,7 +63,7 @@ def test_a_start_at_a_device_time(skin):
 def test_the_device_follows_the_ramp(skin):
     """The setpoint is what `targets_at` says, at the firmware's own time."""
     sequence = bs.Sequence([bs.Step(shape(skin, 12.0), 0.6, "smooth", bs.After(0.3))])
-    skin.play(sequence, wait=False)
+    skin.play(sequence, wait=False, anyway=True)
     begun = None
     for _ in range(12):
         skin.sleep(0.05)
@@ -116,7 +116,7 @@ def test_a_condition_that_comes(skin):
 @pytest.mark.long
 def test_pause_and_resume(skin):
     sequence = bs.Sequence([bs.Step(shape(skin, 12.0), 0.6), bs.Step(None, until=bs.After(0.1))])
-    skin.play(sequence, wait=False)
+    skin.play(sequence, wait=False, anyway=True)
     skin.sleep(0.3)
     skin.pause()
     skin.sleep(0.4)
