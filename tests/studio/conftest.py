@@ -27,7 +27,7 @@ class Running:
     def __init__(self):
         from bubbleskin.studio.server import Studio
 
-        self.studio = Studio("127.0.0.1", 0, TOKEN)
+        self.studio = Studio("127.0.0.1", 0, TOKEN, stays=True)
         self.loop = None
         ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve(ready)), name="studio")

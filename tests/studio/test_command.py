@@ -10,12 +10,16 @@ import urllib.request
 
 import pytest
 
+LEFT_S = 8.0
+"""Seconds without any page after which it ends."""
+
 
 @pytest.fixture
-def studio():
+def studio(request):
     """A studio in a process: the process, and what it printed."""
+    more = getattr(request, "param", [])
     process = subprocess.Popen(
-        [sys.executable, "-m", "bubbleskin", "studio", "--port", "0", "--json", "--device", "sim://wristband7"],
+        [sys.executable, "-m", "bubbleskin", "studio", "--port", "0", "--json", "--device", "sim://wristband7", *more],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -50,6 +54,33 @@ def test_a_notification_pulses_and_ctrl_c_ends_it(studio):
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=20)
     assert (process.returncode, out, err.lstrip()) == (130, "", "Stopped.\n")
+
+
+@pytest.mark.slow
+def test_closing_the_last_page_ends_it(studio, chromium):
+    process, told = studio
+    page = chromium.new_page()
+    page.goto(told["url"])
+    page.locator("[data-bubble='0'][aria-label]").wait_for()
+    page.reload()
+    page.locator("[data-bubble='0'][aria-label]").wait_for()
+    assert process.poll() is None
+    page.close()
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("studio", [["--stay"]], indirect=True)
+def test_told_to_stay_it_does(studio, chromium):
+    process, told = studio
+    page = chromium.new_page()
+    page.goto(told["url"])
+    page.locator("[data-bubble='0'][aria-label]").wait_for()
+    page.close()
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(LEFT_S + 4.0)
+    assert post(f"{told['url'].partition('/?')[0]}/notify?token={told['token']}") == (200, {"problem": ""})
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from bubbleskin.studio.server import Studio
 
 PORT = 8808
+_END = {False: "Closing its last page or Ctrl-C", True: "Ctrl-C"}
 
 
 @click.command()
@@ -40,12 +41,13 @@ PORT = 8808
 @click.option(
     "--open/--no-open", "opened", default=None, help="Open the page in a browser. Default: where there is a screen."
 )
+@click.option("--stay", is_flag=True, help="Stay when the last page is closed: for notifications, and for other pages.")
 @as_json
-def studio(device: str, port: int, host: str, opened: bool | None, json: bool) -> None:
-    """See a wristband live in a browser, and play it: by hand, pulse, terrain, buttons. Until Ctrl-C, which vents.
+def studio(device: str, port: int, host: str, opened: bool | None, stay: bool, json: bool) -> None:
+    """See a wristband live in a browser, and play it: by hand, pulse, terrain, buttons. Until its last page is closed, or Ctrl-C.
 
     Needs the extra `bubbleskin[studio]`. Every run has a token of its own, which is in the address that is printed; nobody
-    comes in without it. Where no page is open any more, everything vents.
+    comes in without it. Where no page is open any more, everything vents, and it ends unless told to stay.
     """
     if importlib.util.find_spec("nicegui") is None:
         raise BubbleskinError("The studio needs NiceGUI. Install it with `pip install 'bubbleskin[studio]'`.")
@@ -56,13 +58,13 @@ def studio(device: str, port: int, host: str, opened: bool | None, json: bool) -
             click.echo(jsonlib.dumps({"url": running.url, "token": running.token}))
         else:
             Console(soft_wrap=True).print(
-                f"The studio is at [bold]{running.url}[/bold]. Ctrl-C vents and ends it.", highlight=False
+                f"The studio is at [bold]{running.url}[/bold]. {_END[stay]} vents and ends it.", highlight=False
             )
         sys.stdout.flush()
         if _has_screen() and not json if opened is None else opened:
             webbrowser.open(running.url)
 
-    run(device, host, port, ready)
+    run(device, host, port, ready, stays=stay)
 
 
 def _has_screen() -> bool:

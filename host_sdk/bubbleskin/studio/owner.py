@@ -145,6 +145,11 @@ class Owner:
             return self._wanted.heights_mm.copy()
         return self.state.target_mm.copy() if self.state else None
 
+    @property
+    def plays(self) -> bool:
+        """Whether a sequence plays."""
+        return self._playing is not None
+
     def play(self, sequence: Playable, activity: str) -> None:
         """Play a sequence by the wristband's clock; it takes over from whatever is played."""
         self._forget()

@@ -6,6 +6,7 @@ import errno
 import logging
 import secrets
 import socket
+import time
 from collections.abc import Callable
 from types import FrameType
 
@@ -25,14 +26,21 @@ from bubbleskin.studio.page import Page
 
 _LAST_WORDS_S = 2
 """Seconds that open connections have at the end."""
+LEFT_S = 8.0
+"""Seconds without any page after which a studio ends that had one: long after everything has vented."""
+_LOOK_S = 0.25
 
 
 class Studio:
-    """A studio: made once in a process, as NiceGUI's pages are; `serve` runs it until `leave` or Ctrl-C."""
+    """A studio: made once in a process, as NiceGUI's pages are; `serve` runs it until `leave` or Ctrl-C.
 
-    def __init__(self, host: str, port: int, token: str = ""):
+    Unless it `stays`, for other pages and notifications, it leaves by itself once its last page has been closed.
+    """
+
+    def __init__(self, host: str, port: int, token: str = "", *, stays: bool = False):
         self.token = token or secrets.token_urlsafe(24)
         self._host = host
+        self._stays = stays
         self._socket = _listen(host, port)
         self.port: int = self._socket.getsockname()[1]
         self.owner = Owner(attended=is_attended)
@@ -61,6 +69,7 @@ class Studio:
         self._server = _Server(config, self.owner)
         opening = asyncio.create_task(self.owner.open(device))
         serving = asyncio.create_task(self._server.serve([self._socket]))
+        watching = asyncio.create_task(self._leave_after_the_last_page())
         notes = _Notes(self.owner)
         logging.getLogger("bubbleskin").addHandler(notes)
         try:
@@ -68,6 +77,7 @@ class Studio:
             ready()
             await serving
         finally:
+            watching.cancel()
             logging.getLogger("bubbleskin").removeHandler(notes)
             await self.owner.close()
             self._socket.close()
@@ -76,6 +86,18 @@ class Studio:
         """End `serve`, from whatever thread."""
         if self._server:
             self._server.should_exit = True
+
+    async def _leave_after_the_last_page(self) -> None:
+        """Leave once there has been a page, and none for a while; what plays meanwhile is played to its end."""
+        last = None
+        while not self._stays:
+            await asyncio.sleep(_LOOK_S)
+            now = time.monotonic()
+            if is_attended() or (last and self.owner.plays):
+                last = now
+            elif last and now - last > LEFT_S:
+                self.leave()
+                return
 
     def _application(self) -> FastAPI:
         app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
@@ -169,8 +191,8 @@ def _listen(host: str, port: int) -> socket.socket:
     return listening
 
 
-def run(device: str, host: str, port: int, ready: Callable[[Studio], None]) -> None:
-    """Serve until Ctrl-C, which vents; `ready` is told once pages can be opened."""
-    studio = Studio(host, port)
+def run(device: str, host: str, port: int, ready: Callable[[Studio], None], *, stays: bool) -> None:
+    """Serve until Ctrl-C or, unless it `stays`, the last page is closed; both vent. `ready` is told once pages can be opened."""
+    studio = Studio(host, port, stays=stays)
     with contextlib.suppress(asyncio.CancelledError):
         asyncio.run(studio.serve(device, lambda: ready(studio)))
