@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bubbleskin.bench.control import page
+from bubbleskin.bench.control import page, touching
 from bubbleskin.bench.control.contenders import CONTENDERS, FIRST, PRESENT, Present
 from bubbleskin.bench.control.figures import Figures
 from bubbleskin.bench.control.fill import fastest_fill
@@ -129,6 +129,13 @@ def figures():
 
 
 @pytest.mark.medium
+@pytest.mark.slow
+def test_of_whatever_size_touching_bubbles_are_measured():
+    rows = list(touching.rows(0.01))
+    assert len({row.name for row in rows}) == len(rows) == 26
+    assert all(np.isfinite(row.value) for row in rows)
+
+
 def test_the_page_shows_the_file_and_check_says_where_not(tmp_path):
     (tmp_path / "docs/data").mkdir(parents=True)
     for path in (page.PAGE, page.TOPS_PAGE):
