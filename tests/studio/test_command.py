@@ -56,12 +56,18 @@ def test_a_notification_pulses_and_ctrl_c_ends_it(studio):
     assert (process.returncode, out, err.lstrip()) == (130, "", "Stopped.\n")
 
 
+def opened(chromium, url):
+    """A page that shows bubbles."""
+    page = chromium.new_page()
+    page.goto(url)
+    page.locator("[data-bubble='0'][aria-label]").wait_for()
+    return page
+
+
 @pytest.mark.slow
 def test_closing_the_last_page_ends_it(studio, chromium):
     process, told = studio
-    page = chromium.new_page()
-    page.goto(told["url"])
-    page.locator("[data-bubble='0'][aria-label]").wait_for()
+    page = opened(chromium, told["url"])
     page.reload()
     page.locator("[data-bubble='0'][aria-label]").wait_for()
     assert process.poll() is None
@@ -74,10 +80,7 @@ def test_closing_the_last_page_ends_it(studio, chromium):
 @pytest.mark.parametrize("studio", [["--stay"]], indirect=True)
 def test_told_to_stay_it_does(studio, chromium):
     process, told = studio
-    page = chromium.new_page()
-    page.goto(told["url"])
-    page.locator("[data-bubble='0'][aria-label]").wait_for()
-    page.close()
+    opened(chromium, told["url"]).close()
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(LEFT_S + 4.0)
     assert post(f"{told['url'].partition('/?')[0]}/notify?token={told['token']}") == (200, {"problem": ""})

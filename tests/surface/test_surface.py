@@ -198,6 +198,25 @@ def test_bubbles_that_were_pressed_for_long_go_flat_before_the_next_shape_that_t
     assert lowest(skin, other)[:3].min() > 10.0
 
 
+@pytest.mark.slow
+def test_on_real_rubber_pressed_bubbles_are_known_only_because_they_go_flat():
+    """Ten shapes that touch, of 3 s each: sizes told against true ones, planned and raw, which never goes flat."""
+    off = {}
+    for plan in (True, False):
+        off[plan] = []
+        for seed in (1, 2):
+            rng = np.random.default_rng(seed)
+            with bs.connect(f"{CROWDED}?rubber=real") as skin:
+                for _ in range(10):
+                    skin.show(rng.uniform(7.0, 13.0, 7), over=0.4, wait=False, plan=plan)
+                    skin.sleep(3.0)
+                    off[plan].append(skin.state().alone_mm - skin.simulated.alone_mm)
+    planned, raw = np.array(off[True]), np.array(off[False])
+    assert np.sqrt(np.mean(planned**2)) < 0.15
+    assert np.sqrt(np.mean(raw**2)) > 0.2
+    assert np.abs(raw).max() > 1.0
+
+
 def test_bubbles_apart_never_go_flat_first(skin):
     for height in (9.0, 9.4):
         skin.show([height] * 7)

@@ -30,7 +30,7 @@ _LONGEST_MM = 1.0  # of one Newton step, of a height alone
 _ITERATIONS = 12
 _PEAK_MM = 0.3
 _FINEST_SHARE = 0.02  # of a way towards what cannot be had
-_LOWERINGS = 3
+_LOWERINGS = 3  # tops that are asked lower lead to another shape, in which others may pass
 _WORTH = 0.03  # an iteration that takes off less of the squared error is the last
 
 

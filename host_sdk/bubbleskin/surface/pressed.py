@@ -1,7 +1,7 @@
 """Which bubbles a wristband no longer knows the size of: those that neighbours have pressed for long since they were flat.
 
-A device takes the pressure by which neighbours push a bubble for that of its rubber: on real rubber it is 1 mm off after some
-ten seconds of it, and says a small standard deviation. A bubble that is flat is measured anew.
+A device takes the pressure by which neighbours push a bubble for that of its rubber: on real rubber what it tells is
+1 mm off after ten shapes. A bubble that is flat is measured anew.
 """
 
 import numpy as np
@@ -22,6 +22,10 @@ class Pressed:
     def __init__(self, gaps: Gaps, bubbles: int):
         self._gaps = gaps
         self._since = np.full(bubbles, np.inf)
+
+    def forget(self) -> None:
+        """All are flat: the wristband has restarted."""
+        self._since[:] = np.inf
 
     def flat(self, which: Flags) -> None:
         """These are flat, or go there now, (n,)."""

@@ -95,7 +95,7 @@ class Shows:
         """A session has been opened: with another boot, what was kept is of the past."""
         if info.boot_id != self._info.boot_id:
             self._kept.forget()
-            self._pressed = Pressed(self._limits.gaps, len(self._layout))
+            self._pressed.forget()
             self.unasked()
         self._info = info
 
