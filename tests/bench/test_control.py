@@ -132,7 +132,7 @@ def figures():
 @pytest.mark.slow
 def test_of_whatever_size_touching_bubbles_are_measured():
     rows = list(touching.rows(0.01))
-    assert len({row.name for row in rows}) == len(rows) == 26
+    assert len({row.name for row in rows}) == len(rows) >= 26
     assert all(np.isfinite(row.value) for row in rows)
 
 
