@@ -92,6 +92,7 @@ def test_no_top_passes_the_limit_and_that_is_said(skin, asked, caplog):
     (said,) = caplog.messages
     assert "cannot have the heights asked" in said
     state = skin.state()
+    assert np.ptp(state.height_mm[1:]) < 0.1, "asked alike, shown alike"
     assert not state.settled
     assert state.arrived
     assert state.target_mm == pytest.approx(np.asarray(asked))

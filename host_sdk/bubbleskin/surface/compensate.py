@@ -30,6 +30,7 @@ _LONGEST_MM = 1.0  # of one Newton step, of a height alone
 _ITERATIONS = 12
 _PEAK_MM = 0.3
 _FINEST_SHARE = 0.02  # of a way towards what cannot be had
+_FAR_MM = 0.8
 _LOWERINGS = 3  # tops that are asked lower lead to another shape, in which others may pass
 _WORTH = 0.03  # an iteration that takes off less of the squared error is the last
 
@@ -70,10 +71,21 @@ class Compensation:
             if best and self._worth(best) <= _SAME_MM:
                 return best
         if best is None or self._worth(best) > SHORT_MM + 0.1:
-            other = (self._lowered() if orders else None) or self._held_back()
-            if best is None or self._worth(other) < self._worth(best):
-                return other
+            return self._within_limits(best, orders)
         return best
+
+    def _within_limits(self, best: Answer | None, orders: bool) -> Answer:
+        """The nearest of `best`, of tops asked lower, and, where these are far, of a share of the way."""
+
+        def off_mm(
+            found: Answer,
+        ) -> float:  # of the worst bubble and of all: else one that is far hides what the others do
+            return self._worth(found) + float(np.sqrt(self._misfit_of(found.predicted_mm) / len(self._asked)))
+
+        found = [one for one in (best, self._lowered() if orders else None) if one]
+        if not found or min(map(self._worth, found)) > _FAR_MM:
+            found.append(self._held_back())
+        return min(found, key=off_mm)
 
     def _new(self, ways: Iterator[tuple[Array, ...]]) -> Iterator[tuple[Array, ...]]:
         """These without steps that lead nowhere, and without what was there before."""
@@ -255,7 +267,10 @@ class Compensation:
         return Answer((alone_mm,), members[0].height_mm, members)
 
     def _misfit(self, shape: "HeldShape") -> float:
-        return float(((self._asked - shape.height_mm) ** 2).sum())
+        return self._misfit_of(shape.height_mm)
+
+    def _misfit_of(self, height_mm: Array) -> float:
+        return float(((self._asked - height_mm) ** 2).sum())
 
     def _worth(self, found: Answer) -> float:
         """How far it is from what was asked, mm, chance included: where tops are as asked, that only chooses among ways."""
