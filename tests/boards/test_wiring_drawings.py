@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter, defaultdict
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -29,9 +29,7 @@ class Drawing:
         self.segments = []
         for wire in root.iter(f"{SVG}polyline"):
             points = [tuple(map(float, point.split(","))) for point in wire.get("points").split()]
-            self.segments += [
-                tuple(sorted(pair)) for pair in zip(points, points[1:], strict=False) if pair[0] != pair[1]
-            ]
+            self.segments += [tuple(sorted(pair)) for pair in pairwise(points) if pair[0] != pair[1]]
 
     def nets(self) -> list[Counter]:
         """The words of all pins that hang together: wires that share an end, or meet at a dot."""

@@ -90,6 +90,14 @@ def test_one_bubble_is_changed_and_the_others_keep_theirs(sheets):
         assert sheets.rms(sheets.errors_mm(skin)[:, 2]) < 0.3
 
 
+def test_a_shape_that_stood_is_not_taken_for_a_sensors_zero(sheets):
+    with sheets.skin_of(sheets.real(seed=8)) as skin:
+        skin.show([12.0] * 7)
+        found = skin.calibrate(2, save=False)
+        assert found[2].verdict.verdict == "accepted", found[2].verdict
+        assert abs(found.measured.zero_pa[2]) < 900  # Pa: three times what sensors of a sheet are off
+
+
 @pytest.mark.parametrize("wrong", ["[]", "[7]", "'2'", "[1.5]"])
 def test_bubbles_that_are_none(wrong):
     with bs.connect(f"sim://{BOARD}") as skin, pytest.raises(bs.InvalidInput, match="bubbles"):

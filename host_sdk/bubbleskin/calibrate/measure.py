@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 
 _MOVED_MM = 0.01
 _TOLD_EVERY = 50  # readings
+_EMPTY_TRIES = 4  # a full bubble is empty after one; whose sensor says otherwise is found by its zero
 _RECENT = 5  # readings whose mean is compared with the pressure that stops a bubble
 
 
@@ -90,7 +91,7 @@ async def measure(skin: Wristband, bubbles: Sequence[int], progress: Progress | 
         return at
 
     try:
-        await skin.vent()
+        await _empty(skin)
         first = (await skin.state()).time
         rest = await _run(skin, [], [Step(0.0, excite.REST_S, True)], tell("zeros, at rest", ()))
         zero = 1e3 * np.mean([state.pressure_kpa for state in rest], axis=0)
@@ -108,6 +109,15 @@ async def measure(skin: Wristband, bubbles: Sequence[int], progress: Progress | 
     finally:
         with contextlib.suppress(LinkError):  # without a host it vents by itself
             await skin.vent()
+
+
+async def _empty(skin: Wristband) -> None:
+    """Vent, and wait for the last pressure to go where a shape stood: it would be taken for the sensors' zeros."""
+    await skin.vent()
+    for _ in range(_EMPTY_TRIES):
+        if (await skin.state()).mode != "venting":
+            return
+        await skin.sleep(excite.GAP_S)
 
 
 async def _run(
