@@ -12,7 +12,7 @@ UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip chip-long check lint generated micropython bench day soak fuzz hostile leaks readers generate lock clean
+.PHONY: help setup demo test chip chip-long check lint generated micropython docs bench day soak fuzz hostile leaks readers generate lock clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -76,6 +76,10 @@ generate: setup ## write all generated files
 
 micropython: setup ## build the real MicroPython that the tests run on, once
 	$(BIN)/python tools/build_micropython.py
+
+docs: setup ## the site, in build/site: fails at a link, an anchor or a page of no menu that leads nowhere
+	$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/site-doctrees -c docs/site . build/site
+	@echo "build/site/index.html"
 
 soak: setup ## a million commands over a line that fails, ten minutes
 	$(BIN)/python tools/stress/soak.py
