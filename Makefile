@@ -12,7 +12,7 @@ UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip chip-long check lint generated micropython docs bench day soak fuzz hostile leaks readers generate lock clean
+.PHONY: help setup demo test chip chip-long check lint generated micropython docs release release-trial bench day soak fuzz hostile leaks readers generate lock clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -80,6 +80,12 @@ micropython: setup ## build the real MicroPython that the tests run on, once
 docs: setup ## the site, in build/site: fails at a link, an anchor or a page of no menu that leads nowhere
 	$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/site-doctrees -c docs/site . build/site
 	@echo "build/site/index.html"
+
+release: setup ## sdist, wheel, UF2s, bill of materials and checksums of this commit, in dist; minutes the first time; uploads nothing
+	$(BIN)/python tools/release/make.py
+
+release-trial: setup ## the wheel of dist in an empty environment without a compiler: installed, and its demo run
+	$(BIN)/python tools/release/trial.py dist/bubbleskin-*/*.whl
 
 soak: setup ## a million commands over a line that fails, ten minutes
 	$(BIN)/python tools/stress/soak.py
