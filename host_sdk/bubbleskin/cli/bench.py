@@ -20,6 +20,7 @@ _HELP = f"""Measure speeds, and how well heights are held, and print them beside
 PART: {", ".join(f"{name} ({what})" for name, what in BENCHES.items())}. Without one, all but {", ".join(LONG)}.
 """
 _CONTROL = "control"
+_SHORT = tuple(name for name in BENCHES if name not in LONG)
 
 
 class OfControl(NamedTuple):
@@ -49,7 +50,10 @@ class OfControl(NamedTuple):
 )
 @click.option("--seed", type=SEED, default=1, show_default=True, help="control: of its first sheet.")
 @click.option(
-    "--write", is_flag=True, help="control: write its figures into docs/control.md and docs/contact.md of this folder."
+    "--write",
+    is_flag=True,
+    help="Without PART: measure all three times and write docs/benchmarks.md of this folder. control: write its figures into "
+    "docs/control.md and docs/contact.md.",
 )
 @click.option("--check", is_flag=True, help="control: measure nothing; fail if that page does not show those figures.")
 @as_json
@@ -58,8 +62,12 @@ def bench(parts: tuple[str, ...], target: str, json: bool, control: OfControl) -
     """Print what `bubbleskin.bench` measures."""
     console = Console(stderr=json)
     alone = parts == (_CONTROL,) and target == "host"
-    if control != OfControl(1.0, 1, False, False) and not alone:
-        raise InvalidInput("--size, --seed, --write and --check are of one bench: bubbleskin bench control --write.")
+    whole = control == OfControl(1.0, 1, True, False) and not parts and target == "host"
+    if control != OfControl(1.0, 1, False, False) and not alone and not whole:
+        raise InvalidInput(
+            "--size, --seed and --check are of one bench, bubbleskin bench control; --write is of that, and of all others "
+            "together, without a PART: bubbleskin bench --write."
+        )
     if control.check:
         from bubbleskin.bench.control import page
 
@@ -69,8 +77,10 @@ def bench(parts: tuple[str, ...], target: str, json: bool, control: OfControl) -
         rows = _of_the_chip(parts, console)
     elif alone:
         rows = _of_control(control, console)
+    elif whole:
+        rows = _of_all(console)
     else:
-        chosen = parts or tuple(name for name in BENCHES if name not in LONG)
+        chosen = parts or _SHORT
         rows = [row for part in track(chosen, "measuring", console=console, transient=True) for row in measure(part)]
     if json:
         click.echo(jsonlib.dumps([row._asdict() for row in rows], indent=2))
@@ -94,6 +104,14 @@ def _of_the_chip(parts: tuple[str, ...], console: Console) -> list[Row]:
             rows.append(row)
             status.update(f"emulating … {row.name}: {row.value:.3g} {row.unit}")
     return rows
+
+
+def _of_all(console: Console) -> list[Row]:
+    from bubbleskin.bench import report
+
+    root = _repository()
+    with console.status("measuring …") as status:
+        return report.write(root, _SHORT, lambda bench: status.update(f"measuring … {bench}, {report.RUNS} times"))
 
 
 def _of_control(asked: OfControl, console: Console) -> list[Row]:
