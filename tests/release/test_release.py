@@ -16,9 +16,9 @@ MAKE, TRIAL = ROOT / "tools/release/make.py", ROOT / "tools/release/trial.py"
 FOLDERS = ("bubble_firmware", "bubble_protocol", "bubbleskin")
 
 
-def make(output: Path, *words: str, **settings: str) -> subprocess.CompletedProcess:
-    """Make one, without the UF2s, which have a test of their own in tests/toolchain."""
-    command = [sys.executable, str(MAKE), "--output", str(output), "--no-firmware", *words]
+def make(output: Path, *words: str, firmware=False, **settings: str) -> subprocess.CompletedProcess:
+    """Make one; the UF2s take minutes where nothing is kept."""
+    command = [sys.executable, str(MAKE), "--output", str(output), *([] if firmware else ["--no-firmware"]), *words]
     environment = os.environ | settings
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
 
@@ -128,3 +128,17 @@ def test_the_wheel_runs_in_an_empty_environment_without_a_compiler(release, tmp_
     assert (
         "conftest.py" in subprocess.run(found, capture_output=True, text=True, check=True, cwd=tmp_path, env={}).stdout
     )
+
+
+@pytest.mark.chip
+def test_the_firmware_of_every_board_is_in_it(tmp_path):
+    from bubbleskin.boards import NAMES
+    from bubbleskin.flash.uf2 import read
+
+    done = make(tmp_path, firmware=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (folder,) = tmp_path.iterdir()
+    sums = (folder / "SHA256SUMS").read_text()
+    images = [next(folder.glob(f"*-{name}.uf2")) for name in NAMES]
+    assert all(image.name in sums for image in images)
+    assert len({read(image).data for image in images}) == len(NAMES)
