@@ -164,7 +164,9 @@ class AsyncSkin:
         """See `Skin.record`."""
         if checks.flag("full", full):
             if rate_hz != 20 or fields is not None:
-                raise InvalidInput("A full recording holds every tick and all that is sent; leave out rate_hz and fields.")
+                raise InvalidInput(
+                    "A full recording holds every tick and all that is sent; leave out rate_hz and fields."
+                )
             return await self._record_all(path, seconds)
         return await self._telemetry.record(path, self.layout, rate_hz, seconds, fields)
 

@@ -8,8 +8,8 @@ from array import array
 from pathlib import Path
 from types import ModuleType
 
-
 from bubble_protocol.version import FIRMWARE
+from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import guarded, path_of
 from bubbleskin.sim.firmware import Firmware, Outputs
@@ -132,8 +132,15 @@ class TraceFile(Sink):
         self._whole = 0  # bytes that hold whole lines
         with guarded(path, "the recording"):
             self._file = path.open("wb", buffering=0)
-        with guarded(path, "the recording"):
-            self._write(b"".join(lines))
+        try:
+            with guarded(path, "the recording"):
+                self._write(b"".join(lines))
+        except InvalidInput:
+            self._file.close()
+            raise
+
+    def write(self, state: State) -> None:
+        """Nothing: a state is in what the board has sent."""
 
     def add(self, block: bytes, ticks: int) -> None:
         """Add a block, after which there are so many ticks. What goes wrong is for `close` to say: here it hits the board."""

@@ -83,6 +83,16 @@ class Head:
         return _line({"bubbleskin": KIND, "format": FORMAT, **facts})
 
 
+class Block(NamedTuple):
+    """A line with calls."""
+
+    tick: int
+    """Ticks before it."""
+    line: int
+    calls: int
+    data: str
+
+
 class Calls:
     """Calls of a firmware with so many bubbles, gathered until they are a block."""
 
@@ -115,18 +125,17 @@ class Trace:
     `name`: how sentences call it.
     """
 
-    def __init__(self, name: str, head: Head, blocks: Sequence[tuple[int, int, str]], ticks: int | None):
+    def __init__(self, name: str, head: Head, blocks: Sequence[Block], ticks: int | None):
         self.name = name
         self.head = head
         self.closed = ticks is not None
-        self._blocks = blocks
-        """Line, calls and data of each."""
-        self.ticks = ticks if ticks is not None else sum(call.kind == TICK for call in self.calls())
+        self.blocks = blocks
+        self.ticks = ticks or 0
 
     def calls(self) -> Iterator[Call]:
         """Every call, in order; `InvalidInput` where a block is damaged."""
-        for number, count, data in self._blocks:
-            yield from _unpacked(data, count, self.head.bubbles, f"{self.name}, line {number}")
+        for block in self.blocks:
+            yield from _unpacked(block, self.head.bubbles, f"{self.name}, line {block.line}")
 
 
 def end_line(ticks: int) -> bytes:
@@ -149,7 +158,7 @@ def read(path: str | Path) -> Trace:
     lines = files.read_bytes(path, _WHAT).split(b"\n")
     head = _head(lines[0], name)
     last = len(lines) - 1  # what follows the last line's end: nothing, or a line that is torn
-    blocks: list[tuple[int, int, str]] = []
+    blocks: list[Block] = []
     ticks = None
     for number, line in enumerate(lines[1:last], 2):
         where = f"{name}, line {number}"
@@ -160,22 +169,23 @@ def read(path: str | Path) -> Trace:
             ticks = checks.whole(f"{where}: end", tree["end"], 0, system.TICKS_WRAP)
         else:
             blocks.append(_block(tree, number, where))
-    return _continuous(Trace(name, head, [block[1:] for block in blocks], ticks), blocks)
+    return _continuous(Trace(name, head, blocks, ticks))
 
 
 _ADVICE = "the file is damaged. Record anew."
 
 
-def _continuous(trace: Trace, blocks: Sequence[tuple[int, int, int, str]]) -> Trace:
+def _continuous(trace: Trace) -> Trace:
     """The trace, where every block begins with the tick at which the one before has ended."""
     tick = 0
-    for first, number, count, data in blocks:
-        where = f"{trace.name}, line {number}"
-        if first != tick:
-            raise InvalidInput(f"{where}: the block begins after {first} ticks, and {tick} have been; {_ADVICE}")
-        tick += sum(call.kind == TICK for call in _unpacked(data, count, trace.head.bubbles, where))
-    if tick != trace.ticks:
+    for block in trace.blocks:
+        where = f"{trace.name}, line {block.line}"
+        if block.tick != tick:
+            raise InvalidInput(f"{where}: the block begins after {block.tick} ticks, and {tick} have been; {_ADVICE}")
+        tick += sum(call.kind == TICK for call in _unpacked(block, trace.head.bubbles, where))
+    if trace.closed and tick != trace.ticks:
         raise InvalidInput(f"{trace.name} says that it has {trace.ticks} ticks and has {tick}; {_ADVICE}")
+    trace.ticks = tick
     return trace
 
 
@@ -232,13 +242,12 @@ def _head(line: bytes, name: str) -> Head:
     return Head(flash=flash, **texts, **whole)  # type: ignore[arg-type]
 
 
-def _block(tree: dict[str, Any], number: int, where: str) -> tuple[int, int, int, str]:
-    """Ticks before, line, calls and data of a block."""
+def _block(tree: dict[str, Any], number: int, where: str) -> Block:
     if not {"tick", "calls", "data"} <= tree.keys():
         raise InvalidInput(f"{where}: this is no block of a recording; {_ADVICE}")
     tick = checks.whole(f"{where}: tick", tree["tick"], 0, system.TICKS_WRAP)
     count = checks.whole(f"{where}: calls", tree["calls"], 1, _CALLS_MOST)
-    return tick, number, count, checks.text(f"{where}: data", tree["data"])
+    return Block(tick, number, count, checks.text(f"{where}: data", tree["data"]))
 
 
 def _packed(data: bytes) -> str:
@@ -259,10 +268,11 @@ def _inflated(text: Any, most: int, where: str) -> bytes:
     return data
 
 
-def _unpacked(text: str, count: int, bubbles: int, where: str) -> Iterator[Call]:
-    sensors, valves = bubbles + 1, 2 * bubbles
+def _unpacked(block: Block, bubbles: int, where: str) -> Iterator[Call]:
+    """The calls of a block; the other way round is `Calls.take`."""
+    count, sensors, valves = block.calls, bubbles + 1, 2 * bubbles
     most = count * (2 * (_HEAD + sensors + valves) + LINK_IN + LINK_OUT)
-    data = _inflated(text, most, where)
+    data = _inflated(block.data, most, where)
     damaged = InvalidInput(f"{where}: the block does not hold what it says; {_ADVICE}")
     if len(data) < 2 * _HEAD * count:
         raise damaged
@@ -281,7 +291,9 @@ def _unpacked(text: str, count: int, bubbles: int, where: str) -> Iterator[Call]
         raise damaged
     steps = np.frombuffer(data, "<u2", ticks * sensors, at).reshape(sensors, ticks).T
     counts = iter(np.cumsum(steps, axis=0, dtype=np.uint16).astype("<u2"))
-    pulses = iter(np.frombuffer(data, "<u2", decisions * valves, at + 2 * ticks * sensors).reshape(valves, -1).T.tolist())
+    pulses = iter(
+        np.frombuffer(data, "<u2", decisions * valves, at + 2 * ticks * sensors).reshape(valves, -1).T.tolist()
+    )
     came, went = rest, rest + int(ins.sum())
     for kind, phase, size_in, size_out, pump, dump in heads.tolist():
         yield Call(

@@ -29,8 +29,9 @@ class Sink(ABC):
     path: Path
     rows: int
 
+    @abstractmethod
     def write(self, state: State) -> None:
-        """Add a state; a file that takes no states is added to by others."""
+        """Add a state."""
 
     @abstractmethod
     def close(self) -> None:
