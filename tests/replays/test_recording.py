@@ -107,16 +107,15 @@ def test_a_full_disk_is_told_and_does_not_stop_the_board(skin, tmp_path):
     (tmp_path / "full.jsonl").symlink_to("/dev/full")
     with pytest.raises(bs.InvalidInput, match="cannot be written: No space left"):
         skin.record(tmp_path / "full.jsonl", full=True)
-    with (
-        pytest.raises(bs.InvalidInput, match=r"a\.jsonl ends after \d+ ticks: File too large"),
-        skin.record(tmp_path / "a.jsonl", full=True) as recording,
-    ):
-        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (6000, hard))  # in the middle of a block
-        try:
-            skin.sleep(5.5)
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    recording = skin.record(tmp_path / "a.jsonl", full=True)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (6000, hard))  # in the middle of a block
+    try:
+        skin.sleep(5.5)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with pytest.raises(bs.InvalidInput, match=r"a\.jsonl ends after \d+ ticks: File too large"):
+        recording.close()
     found = bs.replay(recording.path)
     assert (found.identical, found.ticks) == (True, recording.rows)
     assert 200 < recording.rows < 900

@@ -211,6 +211,22 @@ def test_what_has_no_room_in_a_tick_has_none_on_both_interpreters():
     assert 512 < len(both[0]) <= 1024
 
 
+@pytest.mark.medium
+@pytest.mark.usefixtures("micropython")
+def test_what_stood_in_flash_when_power_came_is_there_again(tmp_path):
+    url = f"sim://wristband7?store={tmp_path / 'flash.bin'}"
+    with bs.connect(url) as skin:
+        skin.configure(rezero_mm=0.7)
+        skin.save()
+    path = tmp_path / "trouble.jsonl"
+    with bs.connect(url) as skin, skin.record(path, full=True):
+        assert skin.settings()["rezero_mm"].value == pytest.approx(0.7)
+        skin.save()
+    for on in ("cpython", "micropython"):
+        found = bs.replay(path, on)
+        assert found.identical, str(found)
+
+
 def test_what_is_asked_for_wrongly_is_told(trouble, tmp_path, command):
     for arguments, said in (
         ({"on": "esp32"}, "one of 'cpython', 'micropython', 'rp2040'"),

@@ -1,6 +1,5 @@
 """What has reached the firmware of a simulated board since power came, and what it has decided: kept, and recorded to files."""
 
-import contextlib
 import datetime
 import os
 import zlib
@@ -129,7 +128,6 @@ class TraceFile(Sink):
         self.rows = history.ticks
         self._history = history
         self._broken: InvalidInput | None = None
-        self._whole = 0  # bytes that hold whole lines
         with guarded(path, "the recording"):
             self._file = path.open("wb", buffering=0)
         try:
@@ -150,9 +148,9 @@ class TraceFile(Sink):
             self._write(block)
             self.rows = ticks
         except OSError as error:
-            self._broken = InvalidInput(f"{self.path} ends after {self.rows} ticks: {error.strerror}.")
-            with contextlib.suppress(OSError):  # a device cannot be cut
-                os.ftruncate(self._file.fileno(), self._whole)
+            self._broken = InvalidInput(
+                f"{self.path} ends after {self.rows} ticks: {error.strerror}."
+            )  # a torn line is passed over
 
     def finish(self, ticks: int) -> None:
         """Write the last line."""
@@ -171,4 +169,3 @@ class TraceFile(Sink):
         view = memoryview(data)
         while view:
             view = view[self._file.write(view) :]
-        self._whole += len(data)
