@@ -32,6 +32,7 @@ class History:
         self._firmware = firmware
         self._calls = Calls(data.BUBBLES)
         self._before = 0  # ticks, before those in `_calls`
+        self._room = BLOCK  # for more calls in the block
         self._blocks: list[bytes] | None = []
         self._bytes = 0
         self._files: list[TraceFile] = []
@@ -42,17 +43,17 @@ class History:
         """The firmware has been given this in a tick, and has decided that."""
         self.ticks += 1
         self._calls.counts += counts
-        self._decided(TICK, 0, link, outputs)
+        self._called(TICK, 0, link, outputs)
 
     def listen(self, phase_us: int, link: bytes, outputs: Outputs) -> None:
         """The same between two ticks."""
-        self._decided(LISTEN, phase_us, link, outputs)
+        self._called(LISTEN, phase_us, link, outputs)
 
     def reset(self) -> None:
         """Power has failed and come back."""
         image = self._firmware.flash_image()
         crc = zlib.crc32(image).to_bytes(4, "little") if image is not None else b""
-        self._called((RESET, 0, 0, len(crc), 0, 0), b"", crc)
+        self._called(RESET, 0, b"", Outputs(array("H"), 0, False, crc))
 
     def record(self, path: str | os.PathLike[str]) -> "TraceFile":
         """Begin a file with all that has been, to which all that comes is added until it is closed. Raises `InvalidInput`."""
@@ -92,17 +93,17 @@ class History:
             recorded=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         )
 
-    def _decided(self, kind: int, phase_us: int, link: bytes, outputs: Outputs) -> None:
-        sent = outputs.link
-        self._calls.pulses += outputs.pulses
-        self._called((kind, phase_us, len(link), len(sent), outputs.pump, outputs.dump), link, sent)
-
-    def _called(self, head: tuple[int, ...], link: bytes, sent: bytes) -> None:
+    def _called(self, kind: int, phase_us: int, link: bytes, outputs: Outputs) -> None:
         calls = self._calls
-        calls.heads += head
-        calls.link += link
-        calls.sent += sent
-        if len(calls) >= BLOCK:
+        pulses, pump, dump, sent = outputs
+        calls.heads += (kind, phase_us, len(link), len(sent), pump, dump)
+        calls.pulses += pulses
+        if link:
+            calls.link += link
+        if sent:
+            calls.sent += sent
+        self._room -= 1
+        if not self._room:
             self._flush()
 
     def _flush(self) -> None:
@@ -110,7 +111,7 @@ class History:
         if not len(self._calls):
             return
         block = self._calls.take(self._before)
-        self._before = self.ticks
+        self._before, self._room = self.ticks, BLOCK
         for file in self._files:
             file.add(block, self.ticks)
         if self._blocks is not None:
@@ -141,16 +142,17 @@ class TraceFile(Sink):
         """Nothing: a state is in what the board has sent."""
 
     def add(self, block: bytes, ticks: int) -> None:
-        """Add a block, after which there are so many ticks. What goes wrong is for `close` to say: here it hits the board."""
+        """Add a block, after which there are so many ticks. What goes wrong is for `close` to say: here it hits the board.
+
+        A line that is torn then is one that `read` passes over.
+        """
         if self._broken:
             return
         try:
             self._write(block)
             self.rows = ticks
         except OSError as error:
-            self._broken = InvalidInput(
-                f"{self.path} ends after {self.rows} ticks: {error.strerror}."
-            )  # a torn line is passed over
+            self._broken = InvalidInput(f"{self.path} ends after {self.rows} ticks: {error.strerror}.")
 
     def finish(self, ticks: int) -> None:
         """Write the last line."""
