@@ -16,7 +16,7 @@ from bubbleskin.link.message import encode, session_key
 from bubbleskin.replays.compare import NOT_COMPARED, Decided, first_difference
 from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.micropython import MicroPythonFirmware
-from bubbleskin.sim.trace_file import LISTEN, RESET, TICK, Call, read
+from bubbleskin.sim.trace_file import LOOK, POWER_FAILED, TICK, Call, read
 
 ALL = "sim://wristband7?seed=2&spread=0.1&loss=0.03"
 
@@ -47,7 +47,7 @@ def test_it_is_identical_here(trouble):
     assert (found.resets, found.notes) == (1, ())
     assert found.ticks == read(trouble).ticks > 500
     assert told[-1] == (found.ticks, found.ticks)
-    assert bool(any(call.kind == RESET and call.sent for call in read(trouble).calls()))
+    assert bool(any(call.kind == POWER_FAILED and call.sent for call in read(trouble).calls()))
 
 
 @pytest.mark.medium
@@ -185,7 +185,7 @@ def test_repeated_fields_crcs_and_noise_are_named():
 
 
 def test_flash_is_compared_when_power_fails():
-    call = Call(RESET, 0, b"", b"", (), 0, False, b"\1\2\3\4")
+    call = Call(POWER_FAILED, 0, b"", b"", (), 0, False, b"\1\2\3\4")
     assert first_difference(call, Decided((), 0, False, b""), 5000) is None  # not seen there
     assert first_difference(call, Decided((), 0, False, b"\1\2\3\5"), 5000) == (
         "CRC-32 of flash",
@@ -276,7 +276,7 @@ def test_what_comes_between_two_ticks_is_replayed(tmp_path):
         board.tick()
     recording.close()
     calls = list(read(recording.path).calls())
-    assert [call.phase_us for call in calls if call.kind == LISTEN] == [1000 + number for number in range(50)]
+    assert [call.phase_us for call in calls if call.kind == LOOK] == [1000 + number for number in range(50)]
     assert bs.replay(recording.path).identical
     with pytest.raises(bs.InvalidInput, match=r"begins when power comes, and that was 0\.25 s ago"):
         board.keep_history()

@@ -13,7 +13,7 @@ from bubbleskin import boards
 from bubbleskin.errors import BubbleskinError, InvalidInput
 from bubbleskin.replays.compare import Decided
 from bubbleskin.replays.players import Player
-from bubbleskin.sim.trace_file import LISTEN, RESET, Call, Head
+from bubbleskin.sim.trace_file import LOOK, POWER_FAILED, Call, Head
 from bubbleskin.toolchain.frozen import BARE
 from bubbleskin.toolchain.rp2040 import built, firmware
 
@@ -112,8 +112,8 @@ class ChipPlayer(Player):
                 size=len(head.flash),
                 board=data.NAME,
                 link_out=LINK_OUT,
-                reset=RESET,
-                listen=LISTEN,
+                reset=POWER_FAILED,
+                listen=LOOK,
             )
         )
         for offset in range(0, len(head.flash), 256):

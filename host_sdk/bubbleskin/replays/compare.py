@@ -9,7 +9,7 @@ from bubble_protocol.schema import messages
 from bubbleskin.link.framing import uncover
 from bubbleskin.link.message import name_of
 from bubbleskin.link.struct_codec import BY_ID
-from bubbleskin.sim.trace_file import RESET, Call
+from bubbleskin.sim.trace_file import POWER_FAILED, Call
 
 NOT_COMPARED = {
     (messages.INFO | messages.REPLY, "heap_free"),
@@ -57,7 +57,7 @@ def first_difference(call: Call, decided: Decided, tick_us: int) -> Found | None
 
     A valve that is open for longer than a period is open throughout.
     """
-    if call.kind == RESET:
+    if call.kind == POWER_FAILED:
         both_seen = call.sent and decided.sent
         return (
             ("CRC-32 of flash", call.sent.hex(), decided.sent.hex())

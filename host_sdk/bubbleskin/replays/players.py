@@ -15,7 +15,7 @@ from bubbleskin.replays.compare import Decided
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.micropython import HEAP, LockstepFirmware, board_import
-from bubbleskin.sim.trace_file import RESET, TICK, Call, Head
+from bubbleskin.sim.trace_file import POWER_FAILED, TICK, Call, Head
 from bubbleskin.toolchain.interpreter import own_micropython
 from bubbleskin.toolchain.unix import micropython
 
@@ -70,7 +70,7 @@ class FirmwarePlayer(Player):
         """See `Player`."""
         firmware = self._firmware
         for call in calls:
-            if call.kind == RESET:
+            if call.kind == POWER_FAILED:
                 firmware.reset()
                 yield call, Decided((), 0, False, self._flash_crc())
             elif call.kind == TICK:

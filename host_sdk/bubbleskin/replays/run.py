@@ -13,7 +13,7 @@ from bubbleskin.files import path_of
 from bubbleskin.replays.compare import Difference, first_difference
 from bubbleskin.replays.players import FirmwarePlayer, OtherProcess, Player, in_process, source_folders
 from bubbleskin.sim.micropython import source_path
-from bubbleskin.sim.trace_file import RESET, TICK, Head, Trace, board_crc, read
+from bubbleskin.sim.trace_file import POWER_FAILED, TICK, Head, Trace, board_crc, read
 from bubbleskin.toolchain.frozen import BARE, device_files, digest
 
 ON = ("cpython", "micropython", "rp2040")
@@ -93,7 +93,7 @@ def replay(
                 difference = Difference(tick, tick * trace.head.tick_us * 1e-6, *found)
                 break
             ticks += call.kind == TICK
-            resets += call.kind == RESET
+            resets += call.kind == POWER_FAILED
             if progress and (ticks % _TOLD == 0 or ticks == trace.ticks):
                 progress(ticks, trace.ticks)
     finally:

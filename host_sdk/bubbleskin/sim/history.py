@@ -12,7 +12,7 @@ from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import guarded, path_of
 from bubbleskin.sim.firmware import Firmware, Outputs
-from bubbleskin.sim.trace_file import LISTEN, RESET, TICK, Calls, Head, board_crc, end_line
+from bubbleskin.sim.trace_file import LOOK, POWER_FAILED, TICK, Calls, Head, board_crc, end_line
 from bubbleskin.telemetry.recording import Sink
 from bubbleskin.toolchain.frozen import BARE, device_files, digest
 
@@ -47,13 +47,13 @@ class History:
 
     def listen(self, phase_us: int, link: bytes, outputs: Outputs) -> None:
         """The same between two ticks."""
-        self._called(LISTEN, phase_us, link, outputs)
+        self._called(LOOK, phase_us, link, outputs)
 
     def reset(self) -> None:
         """Power has failed and come back."""
         image = self._firmware.flash_image()
         crc = zlib.crc32(image).to_bytes(4, "little") if image is not None else b""
-        self._called(RESET, 0, b"", Outputs(array("H"), 0, False, crc))
+        self._called(POWER_FAILED, 0, b"", Outputs(array("H"), 0, False, crc))
 
     def record(self, path: str | os.PathLike[str]) -> "TraceFile":
         """Begin a file with all that has been, to which all that comes is added until it is closed. Raises `InvalidInput`."""

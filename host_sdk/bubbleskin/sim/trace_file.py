@@ -22,9 +22,9 @@ from bubble_protocol.schema import system
 from bubbleskin import checks, files
 from bubbleskin.errors import InvalidInput
 
-FORMAT = 1
+TRACE_FORMAT = 1
 KIND = "full recording"
-TICK, LISTEN, RESET = range(3)
+TICK, LOOK, POWER_FAILED = range(3)
 """What is called: a tick, a look at the link between two, power that fails and comes back."""
 
 _WHAT = "the full recording"
@@ -40,19 +40,19 @@ class Call(NamedTuple):
     """One call of the firmware: what it was given, and what it decided."""
 
     kind: int
-    """TICK, LISTEN or RESET."""
+    """TICK, LOOK or POWER_FAILED."""
     phase_us: int
-    """Of LISTEN: µs since the tick began."""
+    """Of LOOK: µs since the tick began."""
     counts: bytes
     """Of TICK: one little-endian u16 per sensor, the supply's last."""
     link: bytes
     """What came over the link."""
     pulses: tuple[int, ...]
-    """µs per period: fill and vent valve of each bubble in turn. Of RESET: none."""
+    """µs per period: fill and vent valve of each bubble in turn. Of POWER_FAILED: none."""
     pump: int
     dump: bool
     sent: bytes
-    """What went out over the link. Of RESET: the CRC-32 of flash, little-endian, where flash can be seen."""
+    """What went out over the link. Of POWER_FAILED: the CRC-32 of flash, little-endian, where flash can be seen."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Head:
     def line(self) -> bytes:
         """The line."""
         facts = asdict(self) | {"flash": _packed(self.flash), "flash_bytes": len(self.flash)}
-        return _line({"bubbleskin": KIND, "format": FORMAT, **facts})
+        return _line({"bubbleskin": KIND, "format": TRACE_FORMAT, **facts})
 
 
 class Block(NamedTuple):
@@ -211,9 +211,9 @@ def _head(line: bytes, name: str) -> Head:
         raise InvalidInput(f"{name} is no full recording. {advice}") from None
     if tree.get("bubbleskin") != KIND:
         raise InvalidInput(f"{name} is no full recording. {advice}")
-    if tree.get("format") != FORMAT:
+    if tree.get("format") != TRACE_FORMAT:
         raise InvalidInput(
-            f"{name} has the format {checks.shown(tree.get('format'))}; this bubbleskin reads {FORMAT}. "
+            f"{name} has the format {checks.shown(tree.get('format'))}; this bubbleskin reads {TRACE_FORMAT}. "
             "Replay it with the bubbleskin that made it, or record anew."
         )
     missing = [field.name for field in fields(Head) if field.name not in tree]
@@ -278,12 +278,12 @@ def _unpacked(block: Block, bubbles: int, where: str) -> Iterator[Call]:
         raise damaged
     heads = np.frombuffer(data, "<u2", _HEAD * count).reshape(_HEAD, count).T
     kinds, _, ins, outs, _, dumps = heads.T
-    ticks, decisions = int((kinds == TICK).sum()), int((kinds != RESET).sum())
+    ticks, decisions = int((kinds == TICK).sum()), int((kinds != POWER_FAILED).sum())
     at = 2 * _HEAD * count
     rest = at + 2 * (ticks * sensors + decisions * valves)
     if (
         len(data) != rest + int(ins.sum()) + int(outs.sum())
-        or kinds.max() > RESET
+        or kinds.max() > POWER_FAILED
         or ins.max() > LINK_IN
         or outs.max() > LINK_OUT
         or dumps.max() > 1
@@ -301,7 +301,7 @@ def _unpacked(block: Block, bubbles: int, where: str) -> Iterator[Call]:
             phase,
             next(counts).tobytes() if kind == TICK else b"",
             data[came : came + size_in],
-            tuple(next(pulses)) if kind != RESET else (),
+            tuple(next(pulses)) if kind != POWER_FAILED else (),
             pump,
             bool(dump),
             data[went : went + size_out],
