@@ -1,5 +1,6 @@
 """The file of a full recording: what is in it, what a kill leaves of it, and what is told of files that are none."""
 
+import asyncio
 import base64
 import json
 import os
@@ -52,6 +53,20 @@ def test_seconds_give_a_finished_file(skin, tmp_path):
     assert read(recording.path).ticks == trace.ticks
 
 
+def test_it_is_the_same_for_asyncio(tmp_path):
+    async def script():
+        async with await bs.aconnect("sim://wristband7") as skin:
+            async with await skin.record(tmp_path / "a.jsonl", full=True) as recording:
+                await skin.sleep(0.1)
+            await skin.record(tmp_path / "b.jsonl", seconds=0.1, full=True)
+            return recording
+
+    recording = asyncio.run(script())
+    for name in ("a.jsonl", "b.jsonl"):
+        assert read(tmp_path / name).closed
+    assert bs.replay(tmp_path / "b.jsonl").ticks > recording.rows
+
+
 def test_two_files_and_telemetry_go_on_at_once(skin, tmp_path):
     with skin.record(tmp_path / "a.jsonl", full=True) as first, skin.record(tmp_path / "b.csv") as rows:
         skin.sleep(0.2)
@@ -76,6 +91,11 @@ def test_a_real_board_is_refused_with_what_to_do(tmp_path):
         skin.record(tmp_path / "real.jsonl", full=True)
     with pytest.raises(bs.InvalidInput, match=r"keep_history\(\)"):
         board.record(tmp_path / "real.jsonl")
+    with (
+        bs.connect("sim://wristband7?history=0") as skin,
+        pytest.raises(bs.InvalidInput, match="Connect without history=0"),
+    ):
+        skin.record(tmp_path / "real.jsonl", full=True)
     assert not list(tmp_path.iterdir())
 
 

@@ -83,7 +83,8 @@ def test_it_is_identical_on_the_chip(tmp_path):
         skin.sleep(0.3)
         skin.save()
         skin.simulated.reset()
-        skin.sleep(0.1)
+        with pytest.raises(bs.DeviceRestarted):
+            skin.state()
         skin.restart()
         skin.stored()
     found = bs.replay(path, "rp2040")

@@ -37,7 +37,7 @@ from bubbleskin.replays import replay as run
 def replay(file: Path, on: str, firmware: Path | None, board: Path | None, json: bool) -> int:
     """Run the firmware through FILE, a full recording, tick by tick. Status 1 where it decides otherwise, and says where.
 
-    FILE comes of `skin.record("trouble.jsonl", full=True)` or `bubbleskin sim --record trouble.jsonl`.
+    FILE is what `skin.record("trouble.jsonl", full=True)` or `bubbleskin sim --record trouble.jsonl` has written.
     """
     with progress_of_parts(Console(stderr=True)) as bar:
         task = bar.add_task(f"replaying on {on}", total=None)

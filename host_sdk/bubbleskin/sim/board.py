@@ -79,7 +79,7 @@ class Simulated(ABC):
         figures = replace(plant.parameters, conditioned=np.maximum(plant.largest_stretch, 1.0))
         plant_file.write(path, figures, f"The plant of {self.name} with seed={self._seed}, after {plant.time:.3f} s")
 
-    no_history = "its history is not kept: call keep_history() before its first step"
+    no_history = "its history is not kept. Connect without history=0, or call keep_history() before its first step"
     """Why it cannot be recorded in full where `history` is None."""
 
     def record(self, path: str | os.PathLike[str]) -> TraceFile:

@@ -28,8 +28,10 @@ TICK, LOOK, POWER_FAILED = range(3)
 """What is called: a tick, a look at the link between two, power that fails and comes back."""
 
 _WHAT = "the full recording"
+_FILE_MOST = 256 * 2**20
+"""Bytes of a file that is read: hours, see docs/replay.md."""
 _CALLS_MOST = 4096
-_BUBBLES_MOST = 64
+_ROW_MOST = 64
 _FLASH_MOST = 2**20
 _HEAD = 6  # words: kind, phase, bytes in, bytes out, pump, dump
 _LEVEL = 5  # of zlib: beyond it a block takes longer and is hardly smaller
@@ -155,7 +157,7 @@ def read(path: str | Path) -> Trace:
     A last line that is torn is what a kill leaves: it is passed over.
     """
     name = f"The recording {files.path_of(path, _WHAT)}"
-    lines = files.read_bytes(path, _WHAT).split(b"\n")
+    lines = files.read_bytes(path, _WHAT, _FILE_MOST).split(b"\n")
     head = _head(lines[0], name)
     last = len(lines) - 1  # what follows the last line's end: nothing, or a line that is torn
     blocks: list[Block] = []
@@ -222,7 +224,7 @@ def _head(line: bytes, name: str) -> Head:
     whole = {
         key: checks.whole(f"{name}: {key}", tree[key], low, high)
         for key, low, high in (
-            ("bubbles", 1, _BUBBLES_MOST),
+            ("bubbles", 1, _ROW_MOST),
             ("tick_us", 1, 65535),
             ("board_crc", 0, 0xFFFFFFFF),
             ("boot_id", 0, 0xFFFFFFFF),

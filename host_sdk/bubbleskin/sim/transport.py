@@ -92,7 +92,8 @@ def _start(scheme: str, name: str, chosen: Options) -> Simulated:
             flash=flash,
             **chosen.plant,
         )
-        board.keep_history()
+        if chosen.history:
+            board.keep_history()
         return board
     except BaseException:
         if firmware:
