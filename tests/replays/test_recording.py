@@ -18,7 +18,7 @@ import bubbleskin as bs
 from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.link.link import run_sync
 from bubbleskin.sim import SimulatedBoard, SimulatedTransport, history
-from bubbleskin.sim.trace_file import TICK, read
+from bubbleskin.sim.trace_file import LOOK, TICK, read
 from bubbleskin.skin import Skin
 
 
@@ -167,6 +167,23 @@ def test_a_program_that_is_killed_loses_a_second_at_most(tmp_path):
     assert found.identical
     assert 460 < found.ticks <= 662
     assert found.notes == ("The recording was not closed; its last block may be missing.",)
+
+
+@pytest.mark.medium
+def test_a_board_that_is_served_is_recorded(tmp_path):
+    """Its bytes come between ticks, and Ctrl-C finishes the file."""
+    path = tmp_path / "served.jsonl"
+    command = [sys.executable, "-m", "bubbleskin", "sim", "--port", "0", "--json", "--record", str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        with bs.connect(json.loads(process.stdout.readline())["device"]) as skin:
+            skin.show([8.0] * 7, wait=False)
+            skin.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30.0) == 130
+    trace = read(path)
+    assert trace.closed
+    assert bool(any(call.kind == LOOK and call.link for call in trace.calls()))
+    assert bs.replay(path).identical
 
 
 @given(st.data())
