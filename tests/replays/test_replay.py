@@ -45,6 +45,7 @@ def test_it_is_identical_here(trouble):
     found = bs.replay(trouble, progress=lambda done, all_: told.append((done, all_)))
     assert found.identical, str(found)
     assert (found.resets, found.notes) == (1, ())
+    assert "ticks with 1 power failure, " in str(found)
     assert found.ticks == read(trouble).ticks > 500
     assert told[-1] == (found.ticks, found.ticks)
     assert bool(any(call.kind == POWER_FAILED and call.sent for call in read(trouble).calls()))
@@ -236,6 +237,8 @@ def test_what_is_asked_for_wrongly_is_told(trouble, tmp_path, command):
         ({"board": "wristband19"}, "7 bubbles and ticks of 5000 µs, not of wristband19"),
         ({"board": tmp_path / "nowhere.py"}, "no board file"),
         ({"progress": 5}, "progress"),
+        ({"board": 5}, "path of the board is 5"),
+        ({"firmware": 5}, "path of the firmware is 5"),
     ):
         with pytest.raises(bs.InvalidInput, match=said):
             bs.replay(trouble, **arguments)

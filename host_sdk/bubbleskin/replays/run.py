@@ -52,7 +52,7 @@ class Replayed:
     def __str__(self) -> str:
         if self.difference:
             return f"{self.path} differs on {self.on} at {self.difference}."
-        resets = f" and {self.resets} restart{'s' * (self.resets != 1)}" if self.resets else ""
+        resets = f" with {self.resets} power failure{'s' * (self.resets != 1)}" if self.resets else ""
         return f"{self.path} is identical on {self.on}: {self.ticks} ticks{resets}, {self.duration_s:.1f} s of {self.board}."
 
 
@@ -129,7 +129,7 @@ def _board(trace: Trace, board: str | os.PathLike[str] | None) -> ModuleType:
             f"{trace.name} is of the board {checks.shown(head.board)}, which is not one of ours; give its file: "
             f"board='{head.board}.py', or --board."
         )
-    data = boards.load(os.fspath(board) if board is not None else head.board)
+    data = boards.load(str(path_of(board, "the board")) if board is not None else head.board)
     if (head.board, head.bubbles, head.tick_us) != (data.NAME, data.BUBBLES, data.TICK_US):
         raise InvalidInput(
             f"{trace.name} is of the board {head.board}, {head.bubbles} bubbles and ticks of {head.tick_us} µs, not of "
