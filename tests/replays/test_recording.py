@@ -257,3 +257,16 @@ def test_files_that_are_none_are_told_by_place(trouble, tmp_path, command):
         status, out, err = command("replay", path)
         assert (status, out, err.count("\n")) == (2, "", 1), err
         assert said in err
+
+
+def test_a_recording_of_another_firmware_says_so(trouble, tmp_path):
+    path = tmp_path / "old.jsonl"
+    path.write_bytes(
+        changed(trouble.read_bytes().splitlines(), 0, firmware="0.0.9", firmware_sha256="0" * 64, board_crc=1)
+    )
+    found = bs.replay(path)
+    assert found.identical
+    assert found.notes == (
+        "The firmware that was recorded, 0.0.9, is another than this.",
+        "The data of wristband7 are others than those that were recorded.",
+    )
