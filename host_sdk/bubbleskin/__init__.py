@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     )
     from bubbleskin.planner.plan import Plan
     from bubbleskin.planner.search import plan
+    from bubbleskin.replays.run import Replayed, replay
     from bubbleskin.sequence import library as sequences
     from bubbleskin.sequence.model import Sequence
     from bubbleskin.sequence.playback import PlaybackReport, PlaybackStatus
@@ -82,6 +83,7 @@ _ROOMS = {
     "PlaybackReport": "sequence.playback",
     "PlaybackStatus": "sequence.playback",
     "Recording": "telemetry.recording",
+    "Replayed": "replays.run",
     "Repeat": "sequence.steps",
     "RigidContact": "contact.rigid",
     "SelfCalibration": "calibrate.result",
@@ -108,6 +110,7 @@ _ROOMS = {
     "plan": "planner.search",
     "preset": "membrane",
     "read_csv": "membrane",
+    "replay": "replays.run",
     "sweep": "sweeps.run",
 }
 _MODULES = {"patterns": "patterns", "sequences": "sequence.library", "shapes": "shape.shapes"}
@@ -139,6 +142,7 @@ __all__ = [
     "PlaybackStatus",
     "Recording",
     "Repeat",
+    "Replayed",
     "RigidContact",
     "SelfCalibration",
     "Sequence",
@@ -165,6 +169,7 @@ __all__ = [
     "plan",
     "preset",
     "read_csv",
+    "replay",
     "sequences",
     "shapes",
     "sweep",

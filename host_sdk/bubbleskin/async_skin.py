@@ -158,9 +158,34 @@ class AsyncSkin:
         rate_hz: float = 20,
         seconds: float | None = None,
         fields: Iterable[str] | None = None,
+        *,
+        full: bool = False,
     ) -> Recording:
         """See `Skin.record`."""
+        if checks.flag("full", full):
+            if rate_hz != 20 or fields is not None:
+                raise InvalidInput(
+                    "A full recording holds every tick and all that is sent; leave out rate_hz and fields."
+                )
+            return await self._record_all(path, seconds)
         return await self._telemetry.record(path, self.layout, rate_hz, seconds, fields)
+
+    async def _record_all(self, path: str | os.PathLike[str], seconds: float | None) -> Recording:
+        if seconds is not None:
+            seconds = checks.above_zero("seconds", seconds, unit="s")
+        if self.simulated is None:
+            raise InvalidInput(
+                f"{self.link.transport.name} cannot be recorded in full: sensor counts of every tick are more than its wire "
+                f"carries, and without them nothing can be replayed. Record its telemetry, rate_hz={1 / self.info.tick:g} at "
+                "most, without full; or do the same on sim:// or micropython://, and record that in full."
+            )
+        recording = Recording(self.simulated.record(path))
+        if seconds is not None:
+            try:
+                await self.sleep(seconds)
+            finally:
+                await recording.aclose()
+        return recording
 
     async def synchronise(self, pings: int = PINGS) -> Clock:
         """Send pings at once, for the clock to begin with; returns it."""

@@ -197,6 +197,8 @@ class Skin(Pictured):
         rate_hz: float = 20,
         seconds: float | None = None,
         fields: Iterable[str] | None = None,
+        *,
+        full: bool = False,
     ) -> Recording:
         """Record telemetry to a .csv or .parquet file: for `seconds`, or while a `with` block runs.
 
@@ -204,8 +206,11 @@ class Skin(Pictured):
         nothing. `pandas.read_csv(path, comment="#")` and `pandas.read_parquet(path)` read it: a row per state, a column
         per bubble and quantity. A program that is killed leaves all rows so far, in Parquet's case in
         `NAME.partial.csv`. Parquet needs the extra `bubbleskin[parquet]`.
+
+        With `full` a simulated board's file, in .jsonl, has every tick: all that has reached the firmware since power
+        came, and all that it decided. `bubbleskin.replay` runs a firmware through it. A real board is refused.
         """
-        return run_sync(self._skin.record(path, rate_hz, seconds, fields))
+        return run_sync(self._skin.record(path, rate_hz, seconds, fields, full=full))
 
     def synchronise(self, pings: int = PINGS) -> Clock:
         """Send pings at once and return the clock, which knows the better for them."""

@@ -14,6 +14,7 @@ import bubbleskin as bs
 from bubbleskin.files import parse_json, parse_toml
 from bubbleskin.files.tables import parse_table
 from bubbleskin.membrane import Calibration, YeohBalloon, build_table
+from bubbleskin.sim.trace_file import read as read_trace
 
 READERS = {
     "measurements": (bs.read_csv, "data.csv"),
@@ -24,6 +25,7 @@ READERS = {
     "heightfield table": (bs.shapes.load, "field.csv"),
     "heightfield": (bs.shapes.load, "field.npy"),
     "calibration": (Calibration.load, "tables.toml"),
+    "full recording": (read_trace, "trouble.jsonl"),
     "plant": (lambda path: bs.sim.SimulatedBoard("wristband7", contact=False, plant=path), "plant.toml"),
 }
 GOOD = {
@@ -44,6 +46,13 @@ def good(kind, tmp_path):
     if kind == "plant":
         bs.sim.SimulatedBoard("wristband7", contact=False).write_plant(tmp_path / "good.toml")
         return (tmp_path / "good.toml").read_bytes()
+    if kind == "full recording":
+        board = bs.sim.SimulatedBoard("wristband7", contact=False)
+        board.keep_history()
+        recording = board.record(tmp_path / "good.jsonl")
+        board.step(0.05)
+        recording.close()
+        return recording.path.read_bytes()
     if kind == "calibration":
         Calibration("wristband7", (build_table(YeohBalloon(), knots=3),)).save(tmp_path / "good.toml")
         return (tmp_path / "good.toml").read_bytes()

@@ -193,8 +193,8 @@ def chip_boots(boots: int) -> bool:
 
 
 def many_states(scheme: str, states: int) -> bool:
-    """Of one connection."""
-    with bs.connect(f"{scheme}://{BOARD}") as skin:
+    """Of one connection, whose history, which grows up to its limit, is not kept."""
+    with bs.connect(f"{scheme}://{BOARD}&history=0") as skin:
         return measure(f"states of {scheme}://", states, skin.state, states // 100, STATES)
 
 

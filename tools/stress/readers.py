@@ -1,6 +1,6 @@
 """Give every reader of files what no file should be, and see that it is read or refused in a sentence, within bounded memory.
 
-    python tools/stress/readers.py                   # 100,000 inputs for nine readers
+    python tools/stress/readers.py                   # 100,000 inputs for ten readers
     python tools/stress/readers.py --inputs 5000     # fewer
     python tools/stress/readers.py --seed 7          # others
 
@@ -32,6 +32,7 @@ from rich.progress import Progress
 
 import bubbleskin as bs
 from bubbleskin.sim import SimulatedBoard
+from bubbleskin.sim.trace_file import read as read_trace
 
 GROWN_MB = 100.0
 SLOW_S = 20.0
@@ -67,7 +68,12 @@ def readers(folder: Path) -> dict[str, Reader]:
     """All of them."""
     np.save(folder / "good.npy", np.full((2, 3), 6.0))
     bs.Calibration("wristband7", (bs.build_table(bs.YeohBalloon(), knots=3),)).save(folder / "good.toml")
-    SimulatedBoard("wristband7", contact=False).write_plant(folder / "plant.toml")
+    board = SimulatedBoard("wristband7", contact=False)
+    board.write_plant(folder / "plant.toml")
+    board.keep_history()
+    recording = board.record(folder / "trouble.jsonl")
+    board.step(0.05)
+    recording.close()
     sequence = {
         "bubbleskin_sequence": 1,
         "loops": 2,
@@ -87,6 +93,7 @@ def readers(folder: Path) -> dict[str, Reader]:
         "heightfield table": Reader(bs.shapes.load, "field.csv", b"6,7\n8,9\n"),
         "heightfield": Reader(bs.shapes.load, "field.npy", (folder / "good.npy").read_bytes()),
         "calibration": Reader(bs.Calibration.load, "tables.toml", (folder / "good.toml").read_bytes()),
+        "full recording": Reader(read_trace, "trouble.jsonl", (folder / "trouble.jsonl").read_bytes()),
         "plant": Reader(
             lambda path: SimulatedBoard("wristband7", contact=False, plant=str(path)),
             "simulated.toml",

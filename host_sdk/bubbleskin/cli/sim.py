@@ -1,10 +1,22 @@
 """`bubbleskin sim`: serve a simulated wristband to other programs."""
 
+from pathlib import Path
+from typing import NamedTuple
+
 import click
 from rich.console import Console
 
 from bubbleskin import boards
-from bubbleskin.cli.options import SEED, Board, Real, Whole, as_json
+from bubbleskin.cli.options import SEED, Board, Real, Whole, as_json, gathered
+
+
+class _Plant(NamedTuple):
+    """What the plant is to be."""
+
+    seed: int
+    spread: float
+    rubber: str | None
+    plant: str | None
 
 
 @click.command()
@@ -19,17 +31,15 @@ from bubbleskin.cli.options import SEED, Board, Real, Whole, as_json
 @click.option("--rubber", type=click.Choice(["ideal", "real"]), help="What the bubbles are made of.  [default: ideal]")
 @click.option("--plant", type=click.Path(), help="The plant, from a file that `skin.simulated.write_plant` wrote.")
 @click.option("--micropython", is_flag=True, help="Run the firmware in a real MicroPython.")
+@click.option(
+    "--record",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Record all that reaches the firmware to a .jsonl file, for `bubbleskin replay`.",
+)
 @as_json
-def sim(
-    board: str,
-    port: int | None,
-    seed: int,
-    spread: float,
-    rubber: str | None,
-    plant: str | None,
-    micropython: bool,
-    json: bool,
-) -> None:
+@gathered(plant=_Plant)
+def sim(board: str, port: int | None, plant: _Plant, micropython: bool, record: Path | None, json: bool) -> None:
     """Serve a simulated BOARD, by its name or the path of its file, in real time, until Ctrl-C.
 
     Any program can open it with pyserial: at the pseudo-terminal or the socket:// URL that is printed. One has it at a
@@ -39,10 +49,11 @@ def sim(
     from bubbleskin.sim.serve import PtyEnd, TcpEnd, serve
 
     scheme = "micropython" if micropython else "sim"
-    options = {"seed": str(seed), "spread": str(spread)}
-    options |= {name: value for name, value in (("rubber", rubber), ("plant", plant)) if value is not None}
+    options = {name: str(value) for name, value in plant._asdict().items() if value is not None}
     transport, simulated = open_board(scheme, board, options)
+    recording = None
     try:
+        recording = simulated.record(record) if record else None
         end = PtyEnd() if port is None else TcpEnd(port)
         try:
             if json:
@@ -54,6 +65,8 @@ def sim(
         finally:
             end.close()
     finally:
+        if recording:
+            recording.close()
         transport.close()
 
 

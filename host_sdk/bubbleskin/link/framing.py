@@ -50,6 +50,23 @@ def _is_about_hello(content: bytes | bytearray) -> bool:
     return message_id in _ABOUT_HELLO or (message_id == messages.ERROR and content[_REQUEST_AT] == messages.HELLO)
 
 
+def uncover(piece: bytes) -> bytearray | None:
+    """Id, sequence number, payload and CRC of a frame without its delimiter, whatever its CRC; None where it is none."""
+    used = len(piece)
+    if used < _SHORTEST or used >= FRAME_MAX:
+        return None
+    content = bytearray(piece)
+    at = 0
+    while at < used:
+        step = piece[at]
+        content[at] = 0
+        at += step
+    if at != used:
+        return None
+    del content[0]
+    return content
+
+
 class FrameFinder:
     """Finds the frames of one session in a byte stream; survives any bytes.
 
@@ -96,18 +113,9 @@ class FrameFinder:
 
     def _open(self, piece: bytes) -> bytearray | None:
         """What stands in a frame without its delimiter."""
-        used = len(piece)
-        if used < _SHORTEST or used >= FRAME_MAX:
+        content = uncover(piece)
+        if content is None:
             return None
-        content = bytearray(piece)
-        at = 0
-        while at < used:
-            step = piece[at]
-            content[at] = 0
-            at += step
-        if at != used:
-            return None
-        del content[0]
         residue = _crc32(content)
         if residue == self._residue if not _is_about_hello(content) else residue == _UNKEYED:
             return content

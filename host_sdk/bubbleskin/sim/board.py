@@ -1,5 +1,6 @@
 """Whole wristbands without hardware: what each of them is, and the one whose firmware is stepped in lockstep."""
 
+import os
 from abc import ABC, abstractmethod
 from array import array
 from dataclasses import replace
@@ -11,9 +12,11 @@ from numpy.typing import NDArray
 
 from bubble_firmware.hal.lockstep import LINK_IN
 from bubbleskin import boards, checks
+from bubbleskin.errors import InvalidInput
 from bubbleskin.sim import plant_file
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
+from bubbleskin.sim.history import History, TraceFile
 from bubbleskin.sim.recipe import PlantOptions, make_plant
 
 
@@ -47,6 +50,8 @@ class Simulated(ABC):
         """Bytes of the link that the firmware has not read yet."""
         self.from_device = bytearray()
         """Bytes of the link that the firmware has sent and nobody has taken yet."""
+        self.history: History | None = None
+        """What has reached its firmware since power came, where that is kept: what `Skin.record(full=True)` writes."""
         self._seed = seed
         self._asked_s = 0.0  # of `step`, less than a tick
 
@@ -73,6 +78,15 @@ class Simulated(ABC):
         plant = self.plant
         figures = replace(plant.parameters, conditioned=np.maximum(plant.largest_stretch, 1.0))
         plant_file.write(path, figures, f"The plant of {self.name} with seed={self._seed}, after {plant.time:.3f} s")
+
+    no_history = "its history is not kept. Connect without history=0, or call keep_history() before its first step"
+    """Why it cannot be recorded in full where `history` is None."""
+
+    def record(self, path: str | os.PathLike[str]) -> TraceFile:
+        """Begin a full recording, see `Skin.record`; `InvalidInput` where that cannot be."""
+        if self.history is None:
+            raise InvalidInput(f"This {self.name} cannot be recorded in full: {self.no_history}.")
+        return self.history.record(path)
 
     @property
     @abstractmethod
@@ -135,6 +149,12 @@ class SimulatedBoard(Simulated):
         self._sensed = np.frombuffer(self._counts, np.uint16)  # the same memory
         self._decided: array | None = None  # what `_pulses` were made from
 
+    def keep_history(self) -> None:
+        """Keep what reaches the firmware from now on, for full recordings; the board must not have been stepped yet."""
+        if self.plant.time:
+            raise InvalidInput(f"A history begins when power comes, and that was {self.plant.time:g} s ago.")
+        self.history = History(self.data, self.firmware)
+
     @property
     def time(self) -> float:
         """Virtual seconds since the start."""
@@ -153,13 +173,20 @@ class SimulatedBoard(Simulated):
     def tick(self) -> None:
         """One period: the firmware reads the sensors and decides, while the plant goes on as decided before."""
         self.plant.read(self._sensed)
-        outputs = self.firmware.tick(self._counts, self._link_in())
+        link = self._link_in()
+        outputs = self.firmware.tick(self._counts, link)
+        if self.history:
+            self.history.tick(self._counts, link, outputs)
         self.plant.advance(self.tick_s, self._pulses[:, 0], self._pulses[:, 1], self._pump, self._dump)
         self._take(outputs)
 
     def listen(self, phase_us: int) -> None:
         """Between two ticks, `phase_us` µs after the last: the firmware answers what has come over the link."""
-        self._take(self.firmware.listen(self._link_in(), phase_us))
+        link = self._link_in()
+        outputs = self.firmware.listen(link, phase_us)
+        if self.history:
+            self.history.listen(phase_us, link, outputs)
+        self._take(outputs)
 
     def _link_in(self) -> bytes:
         link = bytes(self.to_device[:LINK_IN])
@@ -182,6 +209,8 @@ class SimulatedBoard(Simulated):
         self._pulses[:] = 0.0, self.tick_s
         self._pump, self._dump, self._decided = 0.0, False, None
         self.firmware.reset()
+        if self.history:
+            self.history.reset()
 
     def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
         """Make bubble `number` fail, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 mends it."""
@@ -190,4 +219,6 @@ class SimulatedBoard(Simulated):
 
     def close(self) -> None:
         """End the firmware."""
+        if self.history:
+            self.history.close()
         self.firmware.close()

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from bubble_firmware.app import App
 from bubble_firmware.hal.base import Hal
+from bubble_firmware.hal.lockstep import LINK_OUT
 from bubbleskin.sim import jit
 from bubbleskin.sim.flash import NorFlash
 
@@ -24,7 +25,20 @@ class Outputs(NamedTuple):
 
 
 class Firmware(ABC):
-    """The firmware in some interpreter, as the simulator drives it."""
+    """The firmware in some interpreter, as the simulator drives it.
+
+    `interpreter`: which one, "cpython" or "micropython". `boot_id` and `boot_ticks`: those of its first boot, see `Hal`.
+    `flash_at_start`: what flash held then.
+    """
+
+    interpreter = "cpython"
+    boot_id: int
+    boot_ticks: int
+    flash_at_start: bytes
+
+    def flash_image(self) -> bytes | None:
+        """What flash holds now; None where that cannot be seen."""
+        return None
 
     @abstractmethod
     def tick(self, counts: array, link: bytes) -> Outputs:
@@ -51,7 +65,8 @@ class InProcessFirmware(Firmware, Hal):
         super().__init__(board)
         self.boot_id = boot_id
         self.boot_ticks = boot_ticks
-        self.flash = flash or NorFlash()
+        self.flash: NorFlash = flash or NorFlash()
+        self.flash_at_start = self.flash_image()
         self._restarting = False
         self._counts = array("H", bytes(2 * (board.BUBBLES + 1)))
         self._pulses = array("H", bytes(4 * board.BUBBLES))
@@ -73,6 +88,10 @@ class InProcessFirmware(Firmware, Hal):
         if self._restarting:
             self.reset()
         return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
+
+    def flash_image(self) -> bytes:
+        """See `Firmware`."""
+        return bytes(self.flash.image)
 
     def reset(self) -> None:
         """See `Firmware`."""
@@ -112,7 +131,9 @@ class InProcessFirmware(Firmware, Hal):
         return len(self._in)
 
     def send(self, frame: bytearray, length: int) -> bool:
-        """Queue a frame; there is always room."""
+        """Queue a frame; False where it does not fit: there is as much room as in lockstep."""
+        if len(self._out) + length > LINK_OUT:
+            return False
         self._out += frame[:length]
         return True
 

@@ -1,4 +1,4 @@
-"""The firmware in a real MicroPython (unix port), a subprocess with a heap like the board's, in lockstep."""
+"""The firmware in another process, in lockstep; above all in a real MicroPython (unix port) with a heap like the board's."""
 
 import contextlib
 import select
@@ -6,11 +6,13 @@ import subprocess
 import sys
 import tempfile
 from array import array
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
 import bubble_firmware
 import bubble_protocol
+from bubble_firmware.drivers.flash import SECTOR
 from bubble_firmware.hal.lockstep import LINK_IN, LINK_OUT, LISTEN_ONLY, RESET
 from bubbleskin import boards
 from bubbleskin.errors import LinkError
@@ -21,6 +23,9 @@ from bubbleskin.toolchain.unix import micropython
 HEAP = "448k"
 """What the firmware needs here: 116 kB of data (19 bubbles), as on the Pico, which has 237 kB for them. In this heap
 are also the firmware's code, 137 kB, and 17 kB that stand for flash; and compiling the code takes room and leaves holes."""
+
+FLASH_BYTES = 4 * SECTOR
+"""What stands for flash there; it is blank when the process begins."""
 
 _PATIENCE = 10.0  # wall seconds for one tick, which takes well under a millisecond
 
@@ -39,23 +44,25 @@ def source_path() -> list[str]:
     return [str(Path(package.__path__[0]).parent) for package in (bubble_protocol, bubble_firmware)]
 
 
-class MicroPythonFirmware(Firmware):
-    """A `Firmware` in another process, talked to through `bubble_firmware.hal.lockstep`."""
+def board_import(board: ModuleType) -> str:
+    """The statement that gives a program the data of `board` as `board`; a board's own file lies in its path."""
+    if boards.own_file(board):
+        return f"import {board.NAME} as board"
+    return f"from bubble_firmware.boards import {board.NAME} as board"
 
-    def __init__(self, board: ModuleType, boot_id: int, boot_ticks: int = -1):
-        interpreter = own_micropython() or micropython()  # built now where it has not been, which is said
-        path = source_path()
-        own = boards.own_file(board)
-        if own:
-            path.append(str(own.parent))
-        import_board = (
-            f"import {board.NAME} as board" if own else f"from bubble_firmware.boards import {board.NAME} as board"
-        )
-        program = _PROGRAM.format(path=path, import_board=import_board, boot_id=boot_id, boot_ticks=boot_ticks)
+
+class LockstepFirmware(Firmware):
+    """A `Firmware` in another process, which `command` starts, talked to through `bubble_firmware.hal.lockstep`.
+
+    `what`: how sentences call it. `advice`: what to do where the command does not run.
+    """
+
+    def __init__(self, command: Sequence[str | Path], bubbles: int, what: str, advice: str = ""):
+        self._what = what
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has died
         try:
             self._process = subprocess.Popen(
-                [interpreter, "-X", f"heapsize={HEAP}", "-c", program],
+                command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
@@ -64,10 +71,8 @@ class MicroPythonFirmware(Firmware):
             )
         except OSError as error:
             self._errors.close()
-            raise LinkError(
-                f"{interpreter} does not run ({error.strerror}). Set MICROPYTHON to a 32-bit MicroPython (unix port)."
-            ) from None
-        self._n = board.BUBBLES
+            raise LinkError(f"{command[0]} does not run ({error.strerror}).{advice}") from None
+        self._n = bubbles
         self._size = 2 + 4 * self._n + 4 + LINK_OUT
 
     def tick(self, counts: array, link: bytes) -> Outputs:
@@ -122,7 +127,7 @@ class MicroPythonFirmware(Firmware):
             ready, _, _ = select.select([pipe], [], [], _PATIENCE)
             if not ready:
                 self._process.kill()
-                raise LinkError(f"The firmware in MicroPython has hung: no tick within {_PATIENCE:g} s.")
+                raise LinkError(f"{self._what} has hung: no tick within {_PATIENCE:g} s.")
             part = pipe.read(self._size - len(answer))
             if not part:
                 raise self._died()
@@ -133,4 +138,27 @@ class MicroPythonFirmware(Firmware):
         status = self._process.wait()
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
-        return LinkError(f"The firmware in MicroPython has ended with status {status}: {lines[-1].rstrip('.')}.")
+        return LinkError(f"{self._what} has ended with status {status}: {lines[-1].rstrip('.')}.")
+
+
+class MicroPythonFirmware(LockstepFirmware):
+    """The firmware of `board` in MicroPython, with flash that is blank."""
+
+    interpreter = "micropython"
+
+    def __init__(self, board: ModuleType, boot_id: int, boot_ticks: int = -1):
+        interpreter = own_micropython() or micropython()  # built now where it has not been, which is said
+        self.boot_id = boot_id
+        self.boot_ticks = boot_ticks
+        self.flash_at_start = b"\xff" * FLASH_BYTES
+        path, import_board = source_path(), board_import(board)
+        own = boards.own_file(board)
+        if own:
+            path.append(str(own.parent))
+        program = _PROGRAM.format(path=path, import_board=import_board, boot_id=boot_id, boot_ticks=boot_ticks)
+        super().__init__(
+            [interpreter, "-X", f"heapsize={HEAP}", "-c", program],
+            board.BUBBLES,
+            "The firmware in MicroPython",
+            " Set MICROPYTHON to a 32-bit MicroPython (unix port).",
+        )

@@ -23,6 +23,8 @@ class Options:
     loss: float = 0.0
     """Share of all frames that the line loses, in both directions."""
     contact: bool = True
+    history: bool = True
+    """Whether it keeps what reaches its firmware, for full recordings."""
     store: Path | None = None
     """The file that keeps its flash."""
     plant: PlantOptions = field(default_factory=PlantOptions)
@@ -43,6 +45,7 @@ class Options:
             realtime=bool(values.get("realtime", False)),
             loss=values.get("loss", 0.0),
             contact=bool(values.get("contact", True)),
+            history=bool(values.get("history", True)),
             store=_file(options["store"], url) if "store" in options else None,
             plant=cast(PlantOptions, plant | {name: values[name] for name in NUMBERS if name in values}),
         )

@@ -83,7 +83,7 @@ def _start(scheme: str, name: str, chosen: Options) -> Simulated:
         firmware = MicroPythonFirmware(data, boot_id=chosen.seed + 1)
     try:
         flash = NorFlash(path=chosen.store) if chosen.store else None
-        return SimulatedBoard(
+        board = SimulatedBoard(
             name,
             seed=chosen.seed,
             spread=chosen.spread,
@@ -92,6 +92,9 @@ def _start(scheme: str, name: str, chosen: Options) -> Simulated:
             flash=flash,
             **chosen.plant,
         )
+        if chosen.history:
+            board.keep_history()
+        return board
     except BaseException:
         if firmware:
             firmware.close()

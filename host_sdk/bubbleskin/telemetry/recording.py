@@ -5,6 +5,7 @@ import csv
 import datetime
 import json
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any, Self
@@ -22,7 +23,22 @@ _TEXTS = ("status", "faults")
 _PARTIAL = ".partial.csv"
 
 
-class Table:
+class Sink(ABC):
+    """A file that is recorded to: its `path`, and how many `rows` it has."""
+
+    path: Path
+    rows: int
+
+    @abstractmethod
+    def write(self, state: State) -> None:
+        """Add a state."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Finish the file; a second time does nothing. `InvalidInput` if not all could be written."""
+
+
+class Table(Sink):
     """A file that rows are added to, one per `State`; readable after every row, whatever becomes of this program.
 
     `path` ends in .csv or .parquet. A Parquet file is only whole with its footer, so rows go to a CSV beside it,
@@ -104,12 +120,12 @@ class Table:
 class Recording:
     """Telemetry that goes to a file while the script goes on; made by `Skin.record`. Close it, or leave its `with` block.
 
-    `path`, `rows` and `lost` (telemetry that was due and has not come) tell how it stands.
+    `path`, `rows` and `lost` (telemetry that was due and has not come) tell how it stands. Rows of a full recording are ticks.
     """
 
-    def __init__(self, table: Table, end: Callable[[], Coroutine[Any, Any, None]]):
+    def __init__(self, table: Sink, end: Callable[[], Coroutine[Any, Any, None]] | None = None):
         self._table = table
-        self._end: Callable[[], Coroutine[Any, Any, None]] | None = end
+        self._end = end
         self._broken: InvalidInput | None = None
         self.lost = 0
 
@@ -123,7 +139,7 @@ class Recording:
 
     @property
     def rows(self) -> int:
-        """States in it."""
+        """States in it, or ticks."""
         return self._table.rows
 
     def write(self, state: State) -> None:

@@ -70,6 +70,15 @@ def device_files(board: str) -> dict[str, bytes]:
     return files
 
 
+def digest(files: dict[str, bytes]) -> str:
+    """SHA-256 of sources as of `device_files`: another one, another firmware."""
+    found = hashlib.sha256()
+    for name, content in sorted(files.items()):
+        found.update(f"{name}\0{len(content)}\0".encode())
+        found.update(content)
+    return found.hexdigest()
+
+
 def staged_files(board: str) -> dict[str, bytes]:
     """Every file that decides what is frozen for `board`, as they lie in the folder where `MANIFEST` names them."""
     modules = {f"firmware/{MODULES}": _beside_firmware(MODULES)}

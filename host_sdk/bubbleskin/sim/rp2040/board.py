@@ -40,6 +40,11 @@ class Rp2040Board(Simulated):
     "converter0" or "driver2".
     """
 
+    no_history = (
+        "when the emulated chip looks at its sensors and at its link is seen by nobody. "
+        "Record on sim:// or micropython://, and replay that on the chip: bubbleskin replay FILE --on rp2040"
+    )
+
     def __init__(
         self,
         board: str | Path,
