@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from bubbleskin import boards
-from bubbleskin.bench.rp2040 import boot, burden
 from bubbleskin.bench.rows import Row
+from bubbleskin.bench.rp2040 import boot, burden
 from bubbleskin.sim.rp2040.chip import CLOCK_HZ
 from bubbleskin.sim.rp2040.profiler import INTERRUPT, Profiler, Stack
 from bubbleskin.toolchain.rp2040 import firmware, symbols
@@ -23,10 +23,22 @@ _KINDS = (  # what a function of MicroPython's does, by how its name begins
     ("waiting for a bus", ("i2c_", "check_single_timeout_us", "machine_i2c", "mp_machine_i2c", "machine_adc", "adc_")),
     ("USB", ("tud_", "tu_", "usb", "dcd_", "cdc", "mp_usbd", "hw_endpoint", "stdio", "mp_hal_std", "mp_os_dupterm")),
     ("memory", ("gc_", "m_", "mem")),
-    ("bytecode and its frames", ("mp_execute_bytecode", "mp_setup_code_state", "fun_bc_call", "mp_cstack", "decode_uint")),
+    (
+        "bytecode and its frames",
+        ("mp_execute_bytecode", "mp_setup_code_state", "fun_bc_call", "mp_cstack", "decode_uint"),
+    ),
     (
         "attributes and names",
-        ("mp_map_lookup", "mp_load_", "mp_store_", "find_qstr", "qstr_", "mp_obj_instance", "mp_obj_class", "module_attr"),
+        (
+            "mp_map_lookup",
+            "mp_load_",
+            "mp_store_",
+            "find_qstr",
+            "qstr_",
+            "mp_obj_instance",
+            "mp_obj_class",
+            "module_attr",
+        ),
     ),
 )
 _OTHER = "calls, integers and the rest of MicroPython"

@@ -8,7 +8,10 @@ from bubbleskin.bench.profile import LOAD, Profile
 
 DATA = Path("docs/data/profile.json")
 PAGE = Path("docs/chip.md")
-BEGIN, END = "<!-- profile: made by bubbleskin bench --target rp2040 --profile --write -->\n", "<!-- end of profile -->\n"
+BEGIN, END = (
+    "<!-- profile: made by bubbleskin bench --target rp2040 --profile --write -->\n",
+    "<!-- end of profile -->\n",
+)
 _SHOWN = 24
 """Functions in a table: the others have less than a hundredth each."""
 _LEAST_US, _LEAST_CALLS = 0.5, 0.01

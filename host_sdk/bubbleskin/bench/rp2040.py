@@ -38,6 +38,7 @@ _PHASES = (
 )
 _EDGES = (layout.FIRST_SEGMENT, layout.LAST_SEGMENT)
 _CHUNK = 20  # ticks sent to the prompt at once
+_LOOK_S = 1e-4
 _SAME_US = 20  # so near, two pulses count as one
 
 _HARNESS = """
@@ -177,6 +178,11 @@ def tick_rows(name: str, seconds: float = 5.0) -> Iterator[Row]:
         yield Row("mean, of the 1000 µs that 1 kHz would leave", busy.mean_us / 10, "%")
     yield Row("ticks that began late", busy.late, f"of {busy.ticks}", "0")
     yield Row("heap lost", busy.heap_lost, "bytes", "0")
+    trips = 1e3 * round_trips(name, max(8, round(12 * seconds)))
+    yield Row(
+        f"{name} at rest, a state asked for at any moment: told after, median", float(np.median(trips)), "ms emulated"
+    )
+    yield Row("the longest", float(trips.max()), "ms emulated")
 
 
 class Load(NamedTuple):
@@ -212,6 +218,22 @@ def load(name: str, seconds: float) -> Load:
         before.heap_free - after.heap_free,
         states,
     )
+
+
+def round_trips(name: str, count: int) -> NDArray[np.float64]:
+    """Emulated seconds from asking for a state to having it, `count` times at random moments, of shapes held, (count,)."""
+    board, skin = boot(name)
+    skin.show([9.0] * len(skin.layout), wait=False, plan=False)
+    skin.sleep(1.0)
+    board.tick_s = _LOOK_S  # of the host's looks at its end of the line
+    rng = np.random.default_rng(1)
+    trips = []
+    for wait in rng.uniform(0.01, 0.03, count):
+        skin.sleep(wait)
+        begun = board.time
+        skin.state()
+        trips.append(board.time - begun)
+    return np.array(trips)
 
 
 def boot(name: str) -> "tuple[Rp2040Board, Skin]":

@@ -65,7 +65,9 @@ def bench(parts: tuple[str, ...], target: str, profile: bool, write: bool, json:
     if profile and target != "rp2040":
         raise InvalidInput("--profile is of the emulated chip: bubbleskin bench --target rp2040 --profile.")
     if write and not alone and not profile:
-        raise InvalidInput("--write is of two benches: bubbleskin bench control, and bubbleskin bench --target rp2040 --profile.")
+        raise InvalidInput(
+            "--write is of two benches: bubbleskin bench control, and bubbleskin bench --target rp2040 --profile."
+        )
     if control.check:
         from bubbleskin.bench.control import page
 

@@ -41,7 +41,9 @@ def _draw(axes: Axes, stacks: Mapping[Stack, float], rooms: dict[str, str]) -> N
     _bars(axes, stacks, 0.0, 0, total, rooms)
 
 
-def _bars(axes: Axes, stacks: Mapping[Stack, float], left: float, depth: int, total: float, rooms: dict[str, str]) -> None:
+def _bars(
+    axes: Axes, stacks: Mapping[Stack, float], left: float, depth: int, total: float, rooms: dict[str, str]
+) -> None:
     below: dict[str, dict[Stack, float]] = defaultdict(lambda: defaultdict(float))
     for stack, spent in stacks.items():
         if stack:

@@ -48,7 +48,9 @@ class Profiler:
         self._begun = self._chip.time
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._chip.execute = self._execute
         self.seconds += self._chip.time - self._begun
 
