@@ -1,4 +1,4 @@
-"""Write the tables of the chip's profile in docs/chip.md and draw it, from what `bubbleskin bench --target rp2040 --profile --write` left.
+"""Write the tables of the chip's profile in docs/chip.md and draw it, from what the bench with `--profile --write` left.
 
 python tools/generate/chip_profile.py            # write them
 python tools/generate/chip_profile.py --check    # fail if the tables are not what would be written

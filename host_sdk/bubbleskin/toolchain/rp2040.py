@@ -44,7 +44,7 @@ functions with a large constant then read a wrong one. Measured, and true of the
 
 PATCHES = (  # file, what is there, what takes its place
     ALIGN,
-    # A function with more than 11 words of locals and operands takes its frame from the heap, at every call: 20 µs. There is stack.
+    # A function with more than 11 words of locals and operands takes its frame from the heap at every call: 20 µs.
     ("py/objfun.c", r"(#define VM_MAX_STATE_ON_STACK \(sizeof\(mp_uint_t\) \*) 11\)", r"\1 40)"),
     # Where a name was last found in a dictionary is kept: of 128 places names share half, and a remainder is a division.
     (
