@@ -14,7 +14,7 @@ from bubbleskin.cli.bench import bench
 pytestmark = pytest.mark.slow
 
 SMALL = 0.005
-ON_THE_CHIP = {"rp2040", "trace", "float_law"}
+ON_THE_CHIP = {"rp2040", "profile", "profile_page", "trace", "float_law"}
 
 
 @pytest.mark.parametrize("name", [name for name in BENCHES if name not in LONG])

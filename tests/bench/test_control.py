@@ -169,6 +169,12 @@ def test_what_is_of_control_is_of_nothing_else(arguments):
     assert "bench control" in str(run.exception)
 
 
+def test_only_the_chip_has_a_profile():
+    run = CliRunner().invoke(bench, ["--profile"])
+    assert isinstance(run.exception, InvalidInput)
+    assert "--target rp2040 --profile" in str(run.exception)
+
+
 def test_where_there_is_no_page_nothing_is_measured(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for option in ("--write", "--check"):

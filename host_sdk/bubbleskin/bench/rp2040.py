@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ from bubbleskin.skin import Skin
 from bubbleskin.toolchain.frozen import BARE
 from bubbleskin.toolchain.rp2040 import firmware
 
+if TYPE_CHECKING:
+    from bubbleskin.sim.rp2040.board import Rp2040Board
+
 _US = CLOCK_HZ // 1_000_000  # cycles
 _SHARE = 40  # of its period that a whole tick may take, %
 _PHASES = (
@@ -35,6 +38,7 @@ _PHASES = (
 )
 _EDGES = (layout.FIRST_SEGMENT, layout.LAST_SEGMENT)
 _CHUNK = 20  # ticks sent to the prompt at once
+_LOOK_S = 1e-4
 _SAME_US = 20  # so near, two pulses count as one
 
 _HARNESS = """
@@ -174,6 +178,11 @@ def tick_rows(name: str, seconds: float = 5.0) -> Iterator[Row]:
         yield Row("mean, of the 1000 µs that 1 kHz would leave", busy.mean_us / 10, "%")
     yield Row("ticks that began late", busy.late, f"of {busy.ticks}", "0")
     yield Row("heap lost", busy.heap_lost, "bytes", "0")
+    trips = 1e3 * round_trips(name, max(8, round(12 * seconds)))
+    yield Row(
+        f"{name} at rest, a state asked for at any moment: told after, median", float(np.median(trips)), "ms emulated"
+    )
+    yield Row("the longest", float(trips.max()), "ms emulated")
 
 
 class Load(NamedTuple):
@@ -191,25 +200,10 @@ class Load(NamedTuple):
 
 def load(name: str, seconds: float) -> Load:
     """Run `name` under load: telemetry at 50 Hz and a SHOW of another shape every 50 ms."""
-    board = open_chip(name, firmware([name])[name])
-    transport = SimulatedTransport(board, f"rp2040://{name}")
-    skin = Skin(run_sync(AsyncSkin.open(transport, 2.0)))
-    rng = np.random.default_rng(1)
-    n = len(skin.layout)
-    skin.vent()
-    skin.sleep(0.2)
-    skin.health()  # whatever is made on first use is there now
+    board, skin = boot(name)
     before, histogram = skin.health(), skin.tick_histogram()
-    begun = due = board.time
-    end = begun + seconds
-    states = 0
-    for _ in skin.telemetry(50):
-        states += 1
-        if board.time >= due:
-            skin.show(rng.uniform(5.5, 12.5, n), wait=False, plan=False)
-            due += 0.05
-        if board.time >= end:
-            break
+    begun = board.time
+    states = burden(board, skin, seconds)
     worked = skin.tick_histogram().worked - histogram.worked
     elapsed_us = 1e6 * (board.time - begun)
     skin.vent()
@@ -224,3 +218,45 @@ def load(name: str, seconds: float) -> Load:
         before.heap_free - after.heap_free,
         states,
     )
+
+
+def round_trips(name: str, count: int) -> NDArray[np.float64]:
+    """Emulated seconds from asking for a state to having it, `count` times at random moments, of shapes held, (count,)."""
+    board, skin = boot(name)
+    skin.show([9.0] * len(skin.layout), wait=False, plan=False)
+    skin.sleep(1.0)
+    board.tick_s = _LOOK_S  # of the host's looks at its end of the line
+    rng = np.random.default_rng(1)
+    trips = []
+    for wait in rng.uniform(0.01, 0.03, count):
+        skin.sleep(wait)
+        begun = board.time
+        skin.state()
+        trips.append(board.time - begun)
+    return np.array(trips)
+
+
+def boot(name: str) -> "tuple[Rp2040Board, Skin]":
+    """The emulated board `name` with today's firmware, flat and warm: whatever is made on first use is there."""
+    board = open_chip(name, firmware([name])[name])
+    skin = Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, f"rp2040://{name}"), 2.0)))
+    skin.vent()
+    skin.sleep(0.2)
+    skin.health()
+    return board, skin
+
+
+def burden(board: "Rp2040Board", skin: Skin, seconds: float) -> int:
+    """Keep `board` under the load of `load` for so many emulated seconds; returns how many telemetry messages came."""
+    rng = np.random.default_rng(1)
+    due = board.time
+    end = due + seconds
+    states = 0
+    for _ in skin.telemetry(50):
+        states += 1
+        if board.time >= due:
+            skin.show(rng.uniform(5.5, 12.5, len(skin.layout)), wait=False, plan=False)
+            due += 0.05
+        if board.time >= end:
+            break
+    return states

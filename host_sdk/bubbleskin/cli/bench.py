@@ -28,7 +28,6 @@ class OfControl(NamedTuple):
 
     size: float
     seed: int
-    write: bool
     check: bool
 
 
@@ -49,24 +48,29 @@ class OfControl(NamedTuple):
     help="control: the share of its sheets.",
 )
 @click.option("--seed", type=SEED, default=1, show_default=True, help="control: of its first sheet.")
+@click.option("--profile", is_flag=True, help="rp2040: where a tick goes, function by function.")
 @click.option(
     "--write",
     is_flag=True,
     help="Without PART: measure all three times and write docs/benchmarks.md of this folder. control: write its figures into "
-    "docs/control.md and docs/contact.md.",
+    "docs/control.md and docs/contact.md. --profile: into docs/chip.md.",
 )
 @click.option("--check", is_flag=True, help="control: measure nothing; fail if that page does not show those figures.")
 @as_json
 @gathered(control=OfControl)
-def bench(parts: tuple[str, ...], target: str, json: bool, control: OfControl) -> None:
+def bench(parts: tuple[str, ...], target: str, profile: bool, write: bool, json: bool, control: OfControl) -> None:
     """Print what `bubbleskin.bench` measures."""
     console = Console(stderr=json)
     alone = parts == (_CONTROL,) and target == "host"
-    whole = control == OfControl(1.0, 1, True, False) and not parts and target == "host"
-    if control != OfControl(1.0, 1, False, False) and not alone and not whole:
+    whole = write and not parts and target == "host"
+    if control != OfControl(1.0, 1, False) and not alone:
+        raise InvalidInput("--size, --seed and --check are of one bench: bubbleskin bench control --check.")
+    if profile and target != "rp2040":
+        raise InvalidInput("--profile is of the emulated chip: bubbleskin bench --target rp2040 --profile.")
+    if write and not (alone or whole or profile):
         raise InvalidInput(
-            "--size, --seed and --check are of one bench, bubbleskin bench control; --write is of that, and of all others "
-            "together, without a PART: bubbleskin bench --write."
+            "--write is of bubbleskin bench control, of all benches but that together, without a PART, and of "
+            "--target rp2040 --profile."
         )
     if control.check:
         from bubbleskin.bench.control import page
@@ -74,9 +78,9 @@ def bench(parts: tuple[str, ...], target: str, json: bool, control: OfControl) -
         page.check(_repository())
         return
     if target == "rp2040":
-        rows = _of_the_chip(parts, console)
+        rows = _of_the_chip(parts, profile, write, console)
     elif alone:
-        rows = _of_control(control, console)
+        rows = _of_control(control, write, console)
     elif whole:
         rows = _of_all(console)
     else:
@@ -91,11 +95,13 @@ def bench(parts: tuple[str, ...], target: str, json: bool, control: OfControl) -
     console.print(table)
 
 
-def _of_the_chip(parts: tuple[str, ...], console: Console) -> list[Row]:
+def _of_the_chip(parts: tuple[str, ...], profile: bool, write: bool, console: Console) -> list[Row]:
     if parts:
         raise InvalidInput(f"--target rp2040 measures the chip's firmware; leave out {' and '.join(parts)}.")
     if find_spec("rp2040py") is None:
         raise BubbleskinError("--target rp2040 needs the emulator. Install it: pip install 'bubbleskin[emulator]'.")
+    if profile:
+        return _of_a_tick(write, console)
     from bubbleskin.bench import rp2040
 
     rows = []
@@ -114,10 +120,24 @@ def _of_all(console: Console) -> list[Row]:
         return report.write(root, _SHORT, lambda bench: status.update(f"measuring … {bench}, {report.RUNS} times"))
 
 
-def _of_control(asked: OfControl, console: Console) -> list[Row]:
+def _of_a_tick(write: bool, console: Console) -> list[Row]:
+    from bubbleskin.bench import profile, profile_page
+
+    root = _repository() if write else None
+    found = []
+    with console.status("counting instructions …") as status:
+        for one in profile.profiles():
+            found.append(one)
+            status.update(f"counting instructions … {one.board}, {one.situation}: {one.tick_us:.0f} µs")
+    if root:
+        profile_page.write(root, found)
+    return [row for one in found for row in profile.rows_of(one)]
+
+
+def _of_control(asked: OfControl, write: bool, console: Console) -> list[Row]:
     from bubbleskin.bench.control import measure, page, touching
 
-    root = _repository() if asked.write else None  # found before anything is measured for a quarter of an hour
+    root = _repository() if write else None  # found before anything is measured for a quarter of an hour
     found = []
     with console.status("holding heights …") as status:
         for one in measure.figures(asked.size, asked.seed):

@@ -33,6 +33,8 @@ IMAGE_MAX = (2048 - 1408 - 32) * 1024
 CACHED = 8
 """UF2s of one board: several checkouts may share the cache."""
 COMPILER = "arm-none-eabi-gcc"
+NAMES_OF = "arm-none-eabi-nm"
+"""Of binutils, which the compiler brings."""
 FLASH_BASE, FLASH_FAMILY = 0x10000000, 0xE48BFF56  # where a UF2 for the RP2040 goes, and its family id
 
 ALIGN = ("tools/mpy-tool.py", r"\(aligned \(2\)\)", "(aligned (4))")
@@ -42,6 +44,19 @@ functions with a large constant then read a wrong one. Measured, and true of the
 
 PATCHES = (  # file, what is there, what takes its place
     ALIGN,
+    # A function with more than 11 words of locals and operands takes its frame from the heap at every call: 20 µs.
+    ("py/objfun.c", r"(#define VM_MAX_STATE_ON_STACK \(sizeof\(mp_uint_t\) \*) 11\)", r"\1 40)"),
+    # Where a name was last found in a dictionary is kept: of 128 places names share half, and a remainder is a division.
+    (
+        "ports/rp2/mpconfigport.h",
+        r"(#define MICROPY_OPT_COMPUTED_GOTO +\(1\)\n)",
+        r"\1#define MICROPY_OPT_MAP_LOOKUP_CACHE_SIZE (1024)\n",
+    ),
+    (
+        "py/map.c",
+        r"MAP_CACHE_ENTRY\(index\) % \(map\)->alloc\]",
+        "MAP_CACHE_ENTRY(index) < (map)->alloc ? MAP_CACHE_ENTRY(index) : 0]",
+    ),
     # Debian's source comes without mbedtls.
     ("ports/rp2/CMakeLists.txt", r"set\(MICROPY_SSL_MBEDTLS ON\)\n", ""),
     ("ports/rp2/CMakeLists.txt", r"list\(APPEND GIT_SUBMODULES lib/mbedtls\)\n", ""),
@@ -71,9 +86,14 @@ def built(board: str) -> Path | None:
     name, files = firmware_name(board), staged_files(board)
     for path in folder().glob(f"uf2/{name}-*.uf2"):
         compiler = path.stem.split("-")[1]
-        if path.stem == f"{name}-{compiler}-{key(compiler, files)}":
+        if path.stem == f"{name}-{compiler}-{key(compiler, files)}" and symbols(path).is_file():
             return path
     return None
+
+
+def symbols(uf2: Path) -> Path:
+    """Where the names and addresses of what is in `uf2` are kept, a line each, as `nm` writes them."""
+    return uf2.with_suffix(".symbols")
 
 
 # ---- what the machine must have
@@ -184,9 +204,12 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, run
     assert compiler
     cached = home / "uf2" / f"{name}-{compiler}-{key(compiler, files)}.uf2"
     cached.parent.mkdir(exist_ok=True)
+    named = subprocess.run([NAMES_OF, "-n", build / "firmware.elf"], capture_output=True, text=True, check=True).stdout
+    symbols(cached).write_text(named)
     uf2.rename(cached)
     for old in sorted(cached.parent.glob(f"{name}-*.uf2"), key=os.path.getmtime)[:-CACHED]:
         old.unlink()
+        symbols(old).unlink(missing_ok=True)
     return cached
 
 

@@ -66,12 +66,17 @@ _LOGGER = ConsoleLogger(LogLevel.ERROR)
 """One for all chips: `logging` forgets none, and the emulator gives each a name of its own."""
 
 
+def _execute(simulator: Simulator) -> None:
+    execute_batch(simulator, 1)
+
+
 class Chip:
     """An RP2040 that starts from the UF2 at `path`, or from what is in `flash`, when it is first run.
 
     `from_device` collects what it sends over USB. `mcu` is the emulator's own object, for what is soldered to the
     pins. `resets` counts watchdog and other resets since the start. `in_boot_loader`: it has asked for the ROM's
-    boot loader, whose USB the emulator cannot do; see `bubbleskin.sim.rp2040.boot_rom`.
+    boot loader, whose USB the emulator cannot do; see `bubbleskin.sim.rp2040.boot_rom`. `execute` lets some instructions
+    pass: a profiler may stand in its place.
     """
 
     def __init__(self, path: Path | None, flash: bytes | bytearray = b""):
@@ -84,6 +89,7 @@ class Chip:
         self.mcu.core.pc = FLASH_START_ADDRESS
         self._simulator = Simulator(rp2040=self.mcu)
         self._stop = self.mcu.clock.create_alarm(self._simulator.stop)
+        self.execute: Callable[[Simulator], None] = _execute
         self.from_device = bytearray()
         self.connected = False
         self.resets = 0
@@ -116,7 +122,7 @@ class Chip:
         self._stop.schedule(ahead)
         self._simulator.stopped = False
         while not self._simulator.stopped:
-            execute_batch(self._simulator, 1)
+            self.execute(self._simulator)
 
     def write(self, data: bytes) -> None:
         """Send bytes to the chip over USB."""
