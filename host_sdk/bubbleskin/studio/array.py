@@ -27,6 +27,8 @@ class Array(Element, component=STATIC / "array.js"):
         self.chosen = 0
         """The bubble that this page has chosen."""
         self.on_choose: Callable[[], None] | None = None
+        self.recorded = ""
+        """Which recording it shows, in words; empty where it shows the wristband as it is now."""
         centred = layout.positions_mm - layout.positions_mm.mean(axis=0)
         self.props.update(
             positions=centred.round(3).tolist(),
@@ -39,12 +41,29 @@ class Array(Element, component=STATIC / "array.js"):
         self.on("choose", self._choose)
 
     def take(self, state: State) -> None:
-        """Show another state."""
-        self.run_method("take", message(state))
+        """Show another state, unless a recording is shown."""
+        if not self.recorded:
+            self.run_method("take", message(state))
 
     def take_history(self, states: list[State]) -> None:
-        """Show what was before this page was opened."""
-        self.run_method("history", [message(state) for state in states])
+        """Show what was before this page was opened, unless a recording is shown."""
+        if not self.recorded:
+            self.run_method("history", [message(state) for state in states])
+
+    def show_recorded(self, what: str, state: State, before: list[State]) -> None:
+        """Show a moment of the recording that is called `what`, and what was before it in it, and not what is now."""
+        self.recorded = what
+        self.run_method("record", what, message(state), [message(one) for one in before])
+
+    def go_on_recorded(self, state: State) -> None:
+        """Show the next moment of the recording that is shown."""
+        self.run_method("take", message(state))
+
+    def show_now(self, before: list[State]) -> None:
+        """Show the wristband again; `before`: its states so far."""
+        if self.recorded:
+            self.recorded = ""
+            self.run_method("record", "", message(before[-1]) if before else None, [message(one) for one in before])
 
     def _bubble(self, event: GenericEventArguments) -> None:
         if self.on_bubble:

@@ -16,6 +16,7 @@ from bubbleskin.files import is_image
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.model import Sequence
 from bubbleskin.studio.owner import Owner
+from bubbleskin.studio.recorder import Recorder
 from bubbleskin.studio.widgets import Range
 
 RATE = Range(6.0, 30.0, 1.0, "a minute")
@@ -64,6 +65,7 @@ class Desk:
     token: str
     address: str
     """Of the studio, without the token: http://127.0.0.1:8808."""
+    recorder: Recorder
     pulse: Pulse = field(default_factory=Pulse)
     ground: Ground = field(default_factory=Ground)
     pattern: str = "ripple"

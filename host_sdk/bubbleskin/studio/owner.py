@@ -77,6 +77,8 @@ class Owner:
         """Seconds from a pointer's move in the browser to the wristband's answer that its target is another."""
         self.listeners: set[Callable[[State], None]] = set()
         """Called with each new state, in the event loop."""
+        self.leavers: set[Callable[[], None]] = set()
+        """Called where a wristband is let go of."""
         self._attended = attended
         self._left_at: float | None = None
         self._noted_at = 0.0
@@ -115,6 +117,8 @@ class Owner:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks = []
         skin, self.skin = self.skin, None
+        for leaver in list(self.leavers):
+            leaver()
         self.state = self.health = None
         self.history.clear()
         if skin:

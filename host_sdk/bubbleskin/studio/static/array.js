@@ -62,6 +62,7 @@ export default {
         </select></label>
         <div class="legend" aria-hidden="true"></div>
       </div>
+      <p class="recorded" role="status" hidden></p>
       <svg class="array-figure" role="group" :aria-label="'Array of ' + positions.length + ' bubbles'" preserveAspectRatio="xMidYMid meet"></svg>
       <figure class="strip">
         <figcaption><span class="strip-title"></span>
@@ -77,6 +78,7 @@ export default {
   props: { positions: Array, pitch: Number, rest: Number, max: Number, pressure: Number },
   mounted() {
     this.past = [];
+    this.recorded = "";
     this.latest = null;
     this.drawn = 0;
     this.due = false;
@@ -111,6 +113,19 @@ export default {
     },
     history(messages) {
       this.past = messages;
+    },
+    record(what, message, before) {
+      // A moment of a recording, or, where `what` is empty, what is now again.
+      const said = this.$el.querySelector(".recorded");
+      if (this.recorded !== what) {
+        this.recorded = what;
+        said.textContent = what && `${what}: this is a recording, and not what the wristband does now.`;
+        said.hidden = !what;
+        this.$el.classList.toggle("is-recorded", Boolean(what));
+        this.newest.textContent = what ? "here" : "now";
+      }
+      this.past = before;
+      if (message) this.take(message);
     },
 
     // The camera.
@@ -245,7 +260,8 @@ export default {
     },
     words(bubble, now) {
       const faults = now.f[bubble] || [];
-      return `Bubble ${bubble}: ${now.h[bubble].toFixed(1)} mm, target ${now.g[bubble].toFixed(1)} mm, ${faults.join(", ") || now.s[bubble]}`;
+      const who = this.recorded ? `Recorded, bubble ${bubble}` : `Bubble ${bubble}`;
+      return `${who}: ${now.h[bubble].toFixed(1)} mm, target ${now.g[bubble].toFixed(1)} mm, ${faults.join(", ") || now.s[bubble]}`;
     },
     legend() {
       const legend = this.$el.querySelector(".legend");
@@ -309,7 +325,9 @@ export default {
       }
       for (let age = 0; age <= seconds; age += 5) {
         const anchor = age ? "middle" : "end";
-        make(this.grid, "text", { x: this.across(age), y: height - 5, "text-anchor": anchor }).textContent = age ? `−${age} s` : "now";
+        const label = make(this.grid, "text", { x: this.across(age), y: height - 5, "text-anchor": anchor });
+        label.textContent = age ? `−${age} s` : "now";
+        if (!age) this.newest = label;
       }
       make(this.grid, "text", { x: 2, y: top + 4 }).textContent = "mm";
     },
