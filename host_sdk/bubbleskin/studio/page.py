@@ -12,6 +12,7 @@ from bubbleskin.studio.array import Array
 from bubbleskin.studio.desk import Desk
 from bubbleskin.studio.owner import as_asked
 from bubbleskin.studio.panels.buttons import ButtonsPanel
+from bubbleskin.studio.panels.calibration import CalibrationPanel
 from bubbleskin.studio.panels.live import LivePanel, choose_device
 from bubbleskin.studio.panels.patterns import PatternPanel
 from bubbleskin.studio.panels.pulse import PulsePanel
@@ -37,6 +38,7 @@ PANELS: dict[str, tuple[str, Callable[[Desk, Array], Panel]]] = {
     "buttons": ("Buttons", ButtonsPanel),
     "patterns": ("Patterns", PatternPanel),
     "recorder": ("Recorder", RecorderPanel),
+    "calibration": ("Calibration", CalibrationPanel),
 }
 """By the name in the address: what its tab says, and what makes it."""
 
