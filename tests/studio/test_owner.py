@@ -115,6 +115,9 @@ def test_who_has_it_alone_is_not_disturbed_and_stop_ends_that(with_owner, monkey
         await until(lambda: np.all(heights(owner) > 7.5))
         told = len(owner.history)
         owner.ask(np.full(7, 11.0))
+        assert "calibration has the wristband" in owner.problem
+        assert np.all(owner.wanted_mm < 9)
+        owner.problem = ""
         owner.begin("terrain")
         assert "calibration has the wristband" in owner.problem
         with pytest.raises(InvalidInput, match="calibration has"):
