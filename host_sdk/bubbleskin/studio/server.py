@@ -18,6 +18,7 @@ from nicegui import ui
 from nicegui.client import Client
 from starlette.staticfiles import StaticFiles
 
+from bubbleskin.browser.messages import WEB
 from bubbleskin.errors import InvalidInput
 from bubbleskin.studio.desk import Desk
 from bubbleskin.studio.files import STATIC
@@ -106,6 +107,7 @@ class Studio:
     def _application(self) -> FastAPI:
         app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         app.mount("/studio", StaticFiles(directory=STATIC))
+        app.mount("/array", StaticFiles(directory=WEB))
         owner, desk = self.owner, self.desk
 
         @app.post("/stop")
@@ -136,6 +138,7 @@ class Studio:
         @ui.page("/", title="bubbleskin studio")
         def page(tab: str = "live") -> None:
             ui.add_head_html(
+                '<link rel="stylesheet" href="/array/palette.css"><link rel="stylesheet" href="/array/array.css">'
                 '<link rel="stylesheet" href="/studio/studio.css"><script defer src="/studio/stop.js"></script>'
             )
             Page(desk, tab)
