@@ -101,6 +101,7 @@ def test_where_nobody_looks_everything_vents(with_owner, monkeypatch):
     with_owner(use, attended=lambda: bool(there))
 
 
+@pytest.mark.medium
 def test_who_has_it_alone_is_not_disturbed_and_stop_ends_that(with_owner, monkeypatch):
     async def rise(skin):
         await skin.show(np.full(7, 8.0), wait=False)
@@ -136,6 +137,7 @@ def test_who_has_it_alone_is_not_disturbed_and_stop_ends_that(with_owner, monkey
     with_owner(use)
 
 
+@pytest.mark.medium
 def test_who_has_it_alone_is_ended_where_nobody_looks(with_owner, monkeypatch):
     monkeypatch.setattr(owner_module, "GRACE_S", 0.2)
     there = [True]
