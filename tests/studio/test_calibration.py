@@ -108,7 +108,7 @@ def test_results_are_stepped_through_and_accepted_together(sheet, visit, assista
     page.keyboard.press("Enter")
     page.get_by_role("heading", name="Bubble 4: can be accepted").wait_for()
     page.get_by_role("img", name="Bubble 4: pressure across").wait_for()
-    assert page.locator("img.curve").evaluate("one => one.decode().then(() => one.naturalWidth)") > 400
+    assert page.locator("img.fitted").evaluate("one => one.decode().then(() => one.naturalWidth)") > 400
     page.reload()
     page.get_by_role("heading", name="Bubble 4: can be accepted").wait_for()
     page.get_by_text("Figures with 95 % intervals").click()

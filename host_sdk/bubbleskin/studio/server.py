@@ -120,6 +120,13 @@ class Studio:
             await owner.vent()
             return _answer(owner.problem)
 
+        @app.get("/recordings/{name}")
+        def recording(name: str) -> Response:
+            path = desk.recorder.file(name)
+            if path is None:
+                return PlainTextResponse("There is no such recording in this run.\n", 404)
+            return FileResponse(path, filename=name, headers={"Cache-Control": "no-store"})
+
         @app.post("/notify")
         async def notify() -> JSONResponse:
             return _answer(desk.notify())
@@ -127,13 +134,6 @@ class Studio:
         @app.post("/terrain")
         async def terrain(request: Request, name: str = "") -> JSONResponse:
             return _answer(await desk.upload(name, await request.body()))
-
-        @app.get("/recordings/{name}")
-        def recording(name: str) -> Response:
-            path = desk.recorder.file(name)
-            if path is None:
-                return PlainTextResponse("There is no such recording in this run.\n", 404)
-            return FileResponse(path, filename=name, headers={"Cache-Control": "no-store"})
 
         @ui.page("/", title="bubbleskin studio")
         def page(tab: str = "live") -> None:

@@ -117,6 +117,19 @@ export default {
   methods: {
     // What the server calls.
 
+    record(what, message, before) {
+      // A moment of a recording, or, where `what` is empty, what is now again.
+      const said = this.$el.querySelector(".recorded");
+      if (this.recorded !== what) {
+        this.recorded = what;
+        said.textContent = what && `${what}: this is a recording, and not what the wristband does now.`;
+        said.hidden = !what;
+        this.$el.classList.toggle("is-recorded", Boolean(what));
+        this.newest.textContent = what ? "here" : "now";
+      }
+      this.past = before;
+      if (message) this.take(message);
+    },
     take(message) {
       this.latest = message;
       this.past.push(message);
@@ -132,19 +145,6 @@ export default {
     },
     history(messages) {
       this.past = messages;
-    },
-    record(what, message, before) {
-      // A moment of a recording, or, where `what` is empty, what is now again.
-      const said = this.$el.querySelector(".recorded");
-      if (this.recorded !== what) {
-        this.recorded = what;
-        said.textContent = what && `${what}: this is a recording, and not what the wristband does now.`;
-        said.hidden = !what;
-        this.$el.classList.toggle("is-recorded", Boolean(what));
-        this.newest.textContent = what ? "here" : "now";
-      }
-      this.past = before;
-      if (message) this.take(message);
     },
 
     // The camera.

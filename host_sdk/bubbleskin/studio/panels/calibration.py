@@ -92,7 +92,7 @@ class CalibrationPanel:
             button("Previous", lambda: self._step(-1))
             self._marks = {each.bubble: button("", partial(self._look, each.bubble), "btn small") for each in found}
             button("Next", lambda: self._step(1))
-        self._picture = ui.element("img").classes("curve")
+        self._picture = ui.element("img").classes("fitted")
         self._verdict = text("p", "").props('aria-live="polite"')
         with ui.element("div").classes("row"):
             self._accept = button("", self._accept_one, "btn main")
