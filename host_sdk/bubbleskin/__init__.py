@@ -4,6 +4,7 @@ TYPE_CHECKING = False  # as of `typing`, which is not waited for
 if TYPE_CHECKING:
     from bubbleskin import patterns as patterns
     from bubbleskin.async_skin import AsyncSkin
+    from bubbleskin.browser.live import live
     from bubbleskin.calibrate.measure import CalibrationProgress
     from bubbleskin.calibrate.result import BubbleCalibration, SelfCalibration
     from bubbleskin.connecting import aconnect, connect
@@ -107,6 +108,7 @@ _ROOMS = {
     "fit_contact": "contact.fit",
     "fit_sheet": "membrane",
     "fit_yeoh": "membrane",
+    "live": "browser.live",
     "plan": "planner.search",
     "preset": "membrane",
     "read_csv": "membrane",
@@ -165,6 +167,7 @@ __all__ = [
     "fit_contact",
     "fit_sheet",
     "fit_yeoh",
+    "live",
     "patterns",
     "plan",
     "preset",

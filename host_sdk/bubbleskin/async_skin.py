@@ -331,11 +331,12 @@ class AsyncSkin:
         save: bool = True,
         board: str | os.PathLike[str] | None = None,
         progress: "CalibrateProgress | None" = None,
+        upload: bool = True,
     ) -> "SelfCalibration":
         """See `Skin.calibrate`."""
         from bubbleskin.calibrate import session
 
-        return await session.calibrate(self, bubbles, save, board, progress)
+        return await session.calibrate(self, bubbles, save, board, progress, upload)
 
     async def upload_calibration(self, calibration: "SelfCalibration", save: bool = False) -> None:
         """See `Skin.upload_calibration`."""

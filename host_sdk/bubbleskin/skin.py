@@ -290,16 +290,18 @@ class Skin(Pictured):
         save: bool = True,
         board: str | os.PathLike[str] | None = None,
         progress: "CalibrateProgress | None" = None,
+        upload: bool = True,
     ) -> "SelfCalibration":
         """Let the wristband measure itself with its own sensors, and use what is found.
 
         `bubbles`: one, some, or None for all. They rise to 13 mm in groups that do not touch, which takes 20 s for 7 and 40 s
         for 19; nobody may hold or press them. Bubbles that are accepted get a table and a trim of their own; all others keep
         what they have, and the result says why. With `save` it is kept for good; what is saved stays until all of the new is
-        there. `board`: the file of a board of your own. `progress` is called with a `CalibrationProgress` now and then.
+        there. Without `upload` nothing of the wristband is changed: `upload_calibration` uses the result, or a part of it, later.
+        `board`: the file of a board of your own. `progress` is called with a `CalibrationProgress` now and then.
         Raises `LinkError` where the wristband is lost: it then vents, and has what it had.
         """
-        return run_sync(self._skin.calibrate(bubbles, save=save, board=board, progress=progress))
+        return run_sync(self._skin.calibrate(bubbles, save=save, board=board, progress=progress, upload=upload))
 
     def upload_calibration(self, calibration: "SelfCalibration", save: bool = False) -> None:
         """Use a calibration of this wristband, such as one from a file; only while it is vented. `save` as in `calibrate`."""

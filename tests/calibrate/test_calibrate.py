@@ -1,5 +1,8 @@
 """A sheet that differs in everything, calibrated: what it is worth, what the wristband has then, what is said of it."""
 
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -96,6 +99,28 @@ def test_a_shape_that_stood_is_not_taken_for_a_sensors_zero(sheets):
         found = skin.calibrate(2, save=False)
         assert found[2].verdict.verdict == "accepted", found[2].verdict
         assert abs(found.measured.zero_pa[2]) < 900  # Pa: three times what sensors of a sheet are off
+
+
+def test_what_is_not_uploaded_changes_nothing_until_a_part_of_it_is(sheets):
+    with sheets.skin_of(sheets.real(seed=9)) as skin:
+        before, tables = skin.trim().flow_gain, skin.read_tables()
+        found = skin.calibrate([1, 3], upload=False)
+        assert found.accepted == (1, 3)
+        assert (skin.trim().flow_gain == before).all()
+        assert skin.read_tables() == tables
+        skin.upload_calibration(found.only([3]))
+        assert np.flatnonzero(skin.trim().flow_gain != before).tolist() == [3]
+        with pytest.raises(KeyError, match="bubble 2 was not measured"):
+            found.only([2])
+
+
+def test_in_a_notebook_which_has_an_event_loop_it_fits_too(sheets):
+    async def cell():
+        with sheets.skin_of(sheets.real(seed=9)) as skin:
+            return skin.calibrate([5], upload=False).accepted
+
+    with ThreadPoolExecutor(1) as pool:  # where a test before has left a loop in this thread
+        assert pool.submit(asyncio.run, cell()).result() == (5,)
 
 
 @pytest.mark.parametrize("wrong", ["[]", "[7]", "'2'", "[1.5]"])

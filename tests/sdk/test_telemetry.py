@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ from bubbleskin.errors import InvalidInput
 from bubbleskin.link.message import Message
 from bubbleskin.link.telemetry_queue import TelemetryQueue
 from bubbleskin.telemetry.fields import NAMES, mask
+from bubbleskin.telemetry.recording import Table
 
 
 @pytest.fixture
@@ -126,6 +128,23 @@ def test_a_recording_is_read_by_pandas_in_one_line(skin, tmp_path, suffix):
     np.testing.assert_allclose(frame[[f"target_mm_{b}" for b in range(7)]].iloc[-1], np.linspace(6, 12, 7))
     assert set(frame.status_2) <= {"moving", "settled", "unsure", "resting"}
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_what_a_state_does_not_tell_leaves_its_columns_empty(skin, tmp_path, suffix):
+    unknown = replace(states(skin, 1)[0], sd_mm=np.full(7, np.nan))
+    told = replace(unknown, sd_mm=np.full(7, 0.1))
+    short = replace(told, supply_kpa=np.nan, pressure_kpa=np.full(7, np.nan), faults=(("leak",), *[()] * 6))
+    table = Table(tmp_path / f"x.{suffix}", skin.info, skin.layout, 20)
+    for state in (unknown, told, short):
+        table.write(state)
+    table.close()
+    frame = pd.read_csv(table.path, comment="#") if suffix == "csv" else pd.read_parquet(table.path)
+    assert len(frame) == 3
+    np.testing.assert_array_equal(frame.sd_mm_6, [np.nan, 0.1, 0.1])
+    assert frame.supply_kpa.notna().tolist() == [True, True, False]
+    assert frame.pressure_kpa_3.notna().tolist() == [True, True, False]
+    assert frame.faults_0.iloc[2] == "leak"
 
 
 def test_a_parquet_file_tells_its_origin(skin, tmp_path):

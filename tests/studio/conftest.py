@@ -21,6 +21,11 @@ def until(true, seconds=30.0):
     return said
 
 
+@pytest.fixture(name="until")
+def _until():
+    return until
+
+
 class Running:
     """The studio, as tests use it."""
 

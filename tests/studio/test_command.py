@@ -105,8 +105,8 @@ def test_without_its_extra_it_says_what_to_install(command, monkeypatch):
 
 def test_the_core_knows_nothing_of_it():
     code = (
-        "import sys, bubbleskin, bubbleskin.cli.command;"
-        "print([name for name in ('nicegui', 'fastapi', 'starlette') if name in sys.modules])"
+        "import sys, bubbleskin, bubbleskin.cli.command; bubbleskin.live;"
+        "print([name for name in ('nicegui', 'fastapi', 'starlette', 'anywidget', 'traitlets') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"

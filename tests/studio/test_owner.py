@@ -6,6 +6,8 @@ import time
 import numpy as np
 import pytest
 
+from bubbleskin.errors import InvalidInput
+from bubbleskin.sequence import library as sequences
 from bubbleskin.studio import owner as owner_module
 from bubbleskin.studio.owner import Owner, as_asked, in_real_time
 
@@ -95,6 +97,61 @@ def test_where_nobody_looks_everything_vents(with_owner, monkeypatch):
         await until(lambda: np.all(heights(owner) > 8.5))
         there.clear()
         await until(lambda: np.all(heights(owner) < FLAT_MM))
+
+    with_owner(use, attended=lambda: bool(there))
+
+
+@pytest.mark.medium
+def test_who_has_it_alone_is_not_disturbed_and_stop_ends_that(with_owner, monkeypatch):
+    async def rise(skin):
+        await skin.show(np.full(7, 8.0), wait=False)
+        try:
+            await asyncio.sleep(60)
+        finally:
+            await skin.vent()
+
+    async def use(owner):
+        await until(lambda: owner.state)
+        owner.lend(rise, "calibration")
+        await until(lambda: np.all(heights(owner) > 7.5))
+        told = len(owner.history)
+        owner.ask(np.full(7, 11.0))
+        assert "calibration has the wristband" in owner.problem
+        assert np.all(owner.wanted_mm < 9)
+        owner.problem = ""
+        owner.begin("terrain")
+        assert "calibration has the wristband" in owner.problem
+        with pytest.raises(InvalidInput, match="calibration has"):
+            owner.play(sequences.pulse(owner.skin.layout), "pulse")
+        with pytest.raises(InvalidInput, match="calibration has"):
+            owner.lend(rise, "calibration")
+        await until(lambda: len(owner.history) > told + 3)
+        assert owner.activity == "calibration"
+        assert np.all(heights(owner) < 8.5)
+        await owner.stop()
+        await until(lambda: np.all(heights(owner) < FLAT_MM) and not owner.is_lent)
+        owner.ask(np.full(7, 7.0))
+        await until(lambda: np.all(heights(owner) > 6.7))
+        assert owner.activity == ""
+
+    with_owner(use)
+
+
+@pytest.mark.medium
+def test_who_has_it_alone_is_ended_where_nobody_looks(with_owner, monkeypatch):
+    monkeypatch.setattr(owner_module, "GRACE_S", 0.2)
+    there = [True]
+
+    async def rise(skin):
+        await skin.show(np.full(7, 8.0), wait=False)
+        await asyncio.sleep(60)
+
+    async def use(owner):
+        await until(lambda: owner.state)
+        owner.lend(rise, "calibration")
+        await until(lambda: np.all(heights(owner) > 7.5))
+        there.clear()
+        await until(lambda: np.all(heights(owner) < FLAT_MM) and not owner.is_lent)
 
     with_owner(use, attended=lambda: bool(there))
 

@@ -1,7 +1,7 @@
 """A calibration: what was measured, what was found of each bubble, whether it is used, and how it goes into a file."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -124,6 +124,10 @@ class SelfCalibration(Pictured):
     def device_s(self) -> float:
         """How long the wristband was at it."""
         return self.measured.device_s
+
+    def only(self, bubbles: Iterable[int]) -> Self:
+        """The part of it that is of these bubbles: `upload_calibration` then leaves all others as they are."""
+        return replace(self, bubbles=tuple(self[bubble] for bubble in sorted(set(bubbles))))
 
     def refined(self, heights_mm: Mapping[int, Sequence[tuple[float, float]]], sd_mm: float = 0.05) -> Self:
         """With what measured heights tell of sizes, which no sensor of the board does: the same, fitted again.

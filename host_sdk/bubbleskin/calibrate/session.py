@@ -2,9 +2,9 @@
 
 import asyncio
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -17,15 +17,18 @@ from bubbleskin.device.settings import Setting
 from bubbleskin.device.trim import Trim
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import path_of
+from bubbleskin.link.link import Link
 
 if TYPE_CHECKING:
     from bubbleskin.membrane.table import Table
 
-_T = TypeVar("_T")
-
 
 class Calibrated(Wristband, Protocol):
     """What is needed of an `AsyncSkin` besides: what it has, and how it takes something else."""
+
+    @property
+    def link(self) -> Link:
+        """Whether it waits in an event loop."""
 
     async def settings(self) -> dict[str, Setting]:
         """What can be set."""
@@ -52,9 +55,11 @@ async def calibrate(
     save: bool,
     board: str | os.PathLike[str] | None,
     progress: Progress | None,
+    use: bool = True,
 ) -> SelfCalibration:
-    """Measure, fit, and upload what is accepted: until then nothing of the wristband is changed."""
+    """Measure, fit, and where it is to `use` it, upload what is accepted: until then nothing of the wristband is changed."""
     checks.flag("save", save)
+    checks.flag("upload", use)
     if not skin.info.tells_sd:
         raise InvalidInput(
             f"Firmware {skin.info.firmware} has one figure for both valves, which is too few; update it with `bubbleskin flash`."
@@ -70,8 +75,13 @@ async def calibrate(
     measured = await measure(skin, chosen, progress)
     if progress:
         progress(CalibrationProgress("fitting", tuple(chosen), 1.0))
-    found = await _aside(lambda: SelfCalibration.of(skin.info.board, nominal, measured, atmosphere_kpa, zeros))
-    if found.accepted:
+
+    def fit() -> SelfCalibration:
+        return SelfCalibration.of(skin.info.board, nominal, measured, atmosphere_kpa, zeros)
+
+    # It takes seconds of the processor, for which an event loop would stand still.
+    found = await asyncio.to_thread(fit) if skin.link.event_loop else fit()
+    if use and found.accepted:
         await upload(skin, found, save)
     return found
 
@@ -119,12 +129,3 @@ def merged(
         for name, column in columns.items():
             column[each.bubble] = getattr(each.figures, name)
     return new_tables, replace(trim, **columns)
-
-
-async def _aside(work: Callable[[], _T]) -> _T:
-    """Do what takes seconds of the processor in a thread where there is an event loop, which would stand still."""
-    try:
-        asyncio.get_running_loop()
-    except RuntimeError:
-        return work()
-    return await asyncio.to_thread(work)

@@ -5,6 +5,7 @@ import json as jsonlib
 import os
 import sys
 import webbrowser
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -42,8 +43,16 @@ _END = {False: "Closing its last page or Ctrl-C", True: "Ctrl-C"}
     "--open/--no-open", "opened", default=None, help="Open the page in a browser. Default: where there is a screen."
 )
 @click.option("--stay", is_flag=True, help="Stay when the last page is closed: for notifications, and for other pages.")
+@click.option(
+    "--recordings",
+    type=click.Path(exists=True, file_okay=False, writable=True, path_type=Path),
+    metavar="FOLDER",
+    help="Where recordings stay. Default: they go when the studio ends.",
+)
 @as_json
-def studio(device: str, port: int, host: str, opened: bool | None, stay: bool, json: bool) -> None:
+def studio(
+    device: str, port: int, host: str, opened: bool | None, stay: bool, recordings: Path | None, json: bool
+) -> None:
     """See a wristband live in a browser, and play it: by hand, pulse, terrain, buttons. Until its last page is closed, or Ctrl-C.
 
     Needs the extra `bubbleskin[studio]`. Every run has a token of its own, which is in the address that is printed; nobody
@@ -64,7 +73,7 @@ def studio(device: str, port: int, host: str, opened: bool | None, stay: bool, j
         if _has_screen() and not json if opened is None else opened:
             webbrowser.open(running.url)
 
-    run(device, host, port, ready, stays=stay)
+    run(device, host, port, ready, stays=stay, folder=recordings)
 
 
 def _has_screen() -> bool:

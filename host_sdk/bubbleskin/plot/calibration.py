@@ -44,6 +44,18 @@ def draw(calibration: SelfCalibration) -> Figure:
         return figure
 
 
+def draw_one(each: BubbleCalibration) -> Figure:
+    """The panel of one bubble, larger."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(5.2, 3.6), layout="constrained")
+        axes = figure.subplots()
+        _draw_bubble(axes, each)
+        axes.set(xlabel="pressure (kPa)", ylabel="height (mm)")
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(loc="lower right")
+        return figure
+
+
 def _draw_bubble(axes: Axes, each: BubbleCalibration) -> None:
     amiss = "" if each.verdict.accepted else f": {', '.join(each.verdict.reasons)}"
     axes.set_title(f"bubble {each.bubble}{amiss}", color=_AMISS if amiss else _PULLED)

@@ -19,6 +19,7 @@ from bubbleskin.planner.plan import Plan
 from bubbleskin.plot import calibration as self_calibration
 from bubbleskin.plot.contact import Bubbles, colours, draw_above, draw_side
 from bubbleskin.plot.membrane import COLOURS, STYLE, draw_band, draw_curve
+from bubbleskin.plot.sequence import spheres
 from bubbleskin.sequence.model import Sequence
 from bubbleskin.skin import Skin
 
@@ -65,9 +66,7 @@ def _(skin: Skin) -> Figure:
         bubbles = _Spheres(skin.simulated.height_mm, plant.position_m, plant.parameters.radius * plant.stretch)
         what = "true heights"
     else:
-        radius = state.alone_mm / 2000
-        place = np.column_stack([skin.layout.positions_mm / 1000, state.height_mm / 1000 - radius])
-        bubbles = _Spheres(state.height_mm, place, radius)
+        bubbles = _Spheres(state.height_mm, *spheres(skin.layout, state))
         what = "heights as the wristband knows them"
     return _array(skin.layout, bubbles, state.target_mm, f"{skin.info.board}, {state.mode}, {state.time:.2f} s: {what}")
 

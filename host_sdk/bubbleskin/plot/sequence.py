@@ -1,4 +1,4 @@
-"""Moving pictures: what a sequence looks like, from above and from the side, as GIF or MP4."""
+"""Moving pictures: what a sequence or a recording looks like, from above and from the side, as GIF or MP4."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import guarded, path_of
 from bubbleskin.layout import Layout
@@ -69,6 +70,23 @@ def watch(
             break
         skin.sleep(max(begin + len(frames) * apart - board.time, 0.0))
     return frames
+
+
+def of_states(layout: Layout, states: Sequence[State], *, rate: int = 15, seconds: float = 30.0) -> list[Frame]:
+    """What `states` tell, `rate` times a second, at most `seconds` of it: heights as the wristband knew them."""
+    apart = round(100 / rate) / 100
+    times = np.array([state.time for state in states])
+    frames: list[Frame] = []
+    while len(frames) * apart < min(seconds, times[-1] - times[0] + apart):
+        state = states[int(np.searchsorted(times, times[0] + len(frames) * apart + 1e-9, side="right")) - 1]
+        frames.append(Frame(len(frames) * apart, state.height_mm, *spheres(layout, state)))
+    return frames
+
+
+def spheres(layout: Layout, state: State) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centres, (n, 3), and radii, (n,), in m, of bubbles at `state`: above their places, as who pushes whom aside is not told."""
+    radius = state.alone_mm / 2000
+    return np.column_stack([layout.positions_mm / 1000, state.height_mm / 1000 - radius]), radius
 
 
 def animate(

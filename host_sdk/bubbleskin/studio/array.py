@@ -1,23 +1,21 @@
-"""The live array as an element of the page, and the one message a tick that it takes."""
+"""The live array as an element of the page: one message a tick, and one for each moment of a recording."""
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments
-from numpy.typing import NDArray
 
+from bubbleskin.browser.messages import WEB, geometry, message
 from bubbleskin.device.info import Info
 from bubbleskin.device.state import State
 from bubbleskin.layout import Layout
-from bubbleskin.studio.files import STATIC
 
 BubbleEvent = dict[str, Any]
 """`kind`: enter, leave, press or paint; `bubble`; `stamp`: when, in the browser, s since 1970."""
 
 
-class Array(Element, component=STATIC / "array.js"):
+class Array(Element, component=WEB / "array.js"):
     """The bubbles of `layout`, the strip chart of the chosen one, and all figures as a table."""
 
     def __init__(self, info: Info, layout: Layout):
@@ -27,24 +25,36 @@ class Array(Element, component=STATIC / "array.js"):
         self.chosen = 0
         """The bubble that this page has chosen."""
         self.on_choose: Callable[[], None] | None = None
-        centred = layout.positions_mm - layout.positions_mm.mean(axis=0)
-        self.props.update(
-            positions=centred.round(3).tolist(),
-            pitch=layout.pitch_mm,
-            rest=info.height_rest_mm,
-            max=info.height_max_mm,
-            pressure=info.pressure_max_kpa,
-        )
+        self.recorded = ""
+        """Which recording it shows, in words; empty where it shows the wristband as it is now."""
+        self.props.update(geometry(info, layout))
         self.on("bubble", self._bubble)
         self.on("choose", self._choose)
 
     def take(self, state: State) -> None:
-        """Show another state."""
-        self.run_method("take", message(state))
+        """Show another state, unless a recording is shown."""
+        if not self.recorded:
+            self.run_method("take", message(state))
 
     def take_history(self, states: list[State]) -> None:
-        """Show what was before this page was opened."""
-        self.run_method("history", [message(state) for state in states])
+        """Show what was before this page was opened, unless a recording is shown."""
+        if not self.recorded:
+            self.run_method("history", [message(state) for state in states])
+
+    def show_recorded(self, what: str, state: State, before: list[State]) -> None:
+        """Show a moment of the recording that is called `what`, and what was before it in it, and not what is now."""
+        self.recorded = what
+        self.run_method("record", what, message(state), [message(one) for one in before])
+
+    def go_on_recorded(self, state: State) -> None:
+        """Show the next moment of the recording that is shown."""
+        self.run_method("take", message(state))
+
+    def show_now(self, before: list[State]) -> None:
+        """Show the wristband again; `before`: its states so far."""
+        if self.recorded:
+            self.recorded = ""
+            self.run_method("record", "", message(before[-1]) if before else None, [message(one) for one in before])
 
     def _bubble(self, event: GenericEventArguments) -> None:
         if self.on_bubble:
@@ -54,24 +64,3 @@ class Array(Element, component=STATIC / "array.js"):
         self.chosen = int(event.args["bubble"])
         if self.on_choose:
             self.on_choose()
-
-
-def message(state: State) -> dict[str, Any]:
-    """What a page is sent of a state: short names, hundredths of a mm and of a kPa, and only the faults that there are."""
-    short: dict[str, Any] = {
-        "t": round(state.time, 3),
-        "h": _rounded(state.height_mm),
-        "a": _rounded(state.alone_mm),
-        "g": _rounded(state.target_mm),
-        "p": _rounded(state.pressure_kpa),
-        "s": state.status,
-        "f": {bubble: faults for bubble, faults in enumerate(state.faults) if faults},
-    }
-    if state.sd_mm is not None:
-        short["sd"] = _rounded(state.sd_mm)
-    return short
-
-
-def _rounded(values: NDArray[Any]) -> list[float]:
-    """JSON has no nan: what is not known is 0."""
-    return [round(value, 2) if math.isfinite(value) else 0.0 for value in values.tolist()]

@@ -15,7 +15,9 @@ from bubbleskin.errors import BubbleskinError, InvalidInput
 from bubbleskin.files import is_image
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.model import Sequence
+from bubbleskin.studio.assistant import Assistant
 from bubbleskin.studio.owner import Owner
+from bubbleskin.studio.recorder import Recorder
 from bubbleskin.studio.widgets import Range
 
 RATE = Range(6.0, 30.0, 1.0, "a minute")
@@ -64,11 +66,16 @@ class Desk:
     token: str
     address: str
     """Of the studio, without the token: http://127.0.0.1:8808."""
+    recorder: Recorder
+    assistant: Assistant = field(init=False)
     pulse: Pulse = field(default_factory=Pulse)
     ground: Ground = field(default_factory=Ground)
     pattern: str = "ripple"
     pressed: list[str] = field(default_factory=list)
     """What the buttons said, a line each, the newest last."""
+
+    def __post_init__(self) -> None:
+        self.assistant = Assistant(self.owner)
 
     @property
     def layout(self) -> Layout:

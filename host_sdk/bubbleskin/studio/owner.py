@@ -15,7 +15,7 @@ from bubbleskin.async_skin import AsyncSkin
 from bubbleskin.connecting import SIMULATED, aconnect
 from bubbleskin.device.health import Health
 from bubbleskin.device.state import State
-from bubbleskin.errors import BubbleskinError, LinkError
+from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError
 from bubbleskin.sequence.model import Playable
 from bubbleskin.surface.shows import STREAM_S
 from bubbleskin.telemetry.fields import USUAL, most
@@ -31,7 +31,10 @@ _RETRY_S = 1.0
 _STREAM_S = 0.05
 """Of a change that is asked for at once: as long as the page takes for a tick."""
 _CARE_S = 0.5
+_ASKED_S = 0.1
+"""Between two states of a wristband that is lent: its telemetry is then another's."""
 _READ_S = 6.0
+_LENT = "A calibration has the wristband; stop or vent ends it, and then it plays again."
 _LATENCIES = 500
 
 
@@ -77,6 +80,8 @@ class Owner:
         """Seconds from a pointer's move in the browser to the wristband's answer that its target is another."""
         self.listeners: set[Callable[[State], None]] = set()
         """Called with each new state, in the event loop."""
+        self.leavers: set[Callable[[], None]] = set()
+        """Called where a wristband is let go of."""
         self._attended = attended
         self._left_at: float | None = None
         self._noted_at = 0.0
@@ -84,6 +89,7 @@ class Owner:
         self._wake = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
         self._playing: asyncio.Task[None] | None = None
+        self._lent: asyncio.Task[None] | None = None
         self._showing: asyncio.Task[bool] | None = None
         self._changing = asyncio.Lock()
 
@@ -112,9 +118,11 @@ class Owner:
         self._forget()
         for task in self._tasks:
             task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._tasks = []
+        await asyncio.gather(*self._tasks, *([self._lent] if self._lent else []), return_exceptions=True)
+        self._tasks, self._lent = [], None
         skin, self.skin = self.skin, None
+        for leaver in list(self.leavers):
+            leaver()
         self.state = self.health = None
         self.history.clear()
         if skin:
@@ -127,6 +135,9 @@ class Owner:
 
     def ask(self, heights_mm: NDArray[np.float64], over: float = 0.0, stamp: float = 0.0) -> None:
         """Want these heights, (n,), mm, from now on. What was wanted before and has not been sent is not sent any more."""
+        if self.is_lent:
+            self.problem = _LENT
+            return
         self._end_playing()
         self._wanted = Intention(heights_mm, over, stamp)
         self._wake.set()
@@ -151,15 +162,36 @@ class Owner:
         return self._playing is not None
 
     def play(self, sequence: Playable, activity: str) -> None:
-        """Play a sequence by the wristband's clock; it takes over from whatever is played."""
+        """Play a sequence by the wristband's clock; it takes over from whatever is played. `InvalidInput` where it is lent."""
+        if self.is_lent:
+            raise InvalidInput(_LENT)
         self._forget()
         self.activity = activity
         self._playing = asyncio.create_task(self._play(sequence))
 
     def begin(self, activity: str) -> None:
         """From now on pointer and keys of the page of `activity` move bubbles."""
+        if self.is_lent:
+            self.problem = _LENT
+            return
         self._end_playing()
         self.activity = activity
+
+    @property
+    def is_lent(self) -> bool:
+        """Whether somebody has the wristband alone."""
+        return self._lent is not None and not self._lent.done()
+
+    def lend(self, work: Callable[[AsyncSkin], Coroutine[Any, Any, None]], activity: str) -> None:
+        """Let `work` have the wristband alone until it is done: nobody else moves it meanwhile, but stop and vent cancel it.
+
+        `InvalidInput` where there is no wristband, or it is lent already.
+        """
+        if self.skin is None or self.is_lent:
+            raise InvalidInput(_LENT if self.skin else self.problem or "No wristband is connected.")
+        self._forget()
+        self.activity = activity
+        self._lent = asyncio.create_task(self._lend(work(self.skin)))
 
     async def stop(self) -> None:
         """Close all valves: before all else that is asked, which is dropped."""
@@ -182,6 +214,8 @@ class Owner:
         self._end_playing()
         self._wanted = None
         self.activity = ""
+        if self._lent:
+            self._lent.cancel()
         if self._showing:
             self._showing.cancel()  # or it would be sent after a stop
 
@@ -190,6 +224,12 @@ class Owner:
         playing, self._playing = self._playing, None
         if playing:
             playing.cancel()
+            self.activity = ""
+
+    async def _lend(self, work: Coroutine[Any, Any, None]) -> None:
+        try:
+            await self._say(work)
+        finally:
             self.activity = ""
 
     async def _play(self, sequence: Playable) -> None:
@@ -225,15 +265,22 @@ class Owner:
         fields = USUAL[: most(skin.info.bubbles)]
         while True:
             try:
+                while self.is_lent:
+                    self._tell(await skin.state())
+                    await asyncio.sleep(_ASKED_S)
                 async for state in skin.telemetry(RATE_HZ, fields):
-                    self.state = state
-                    self.history.append(state)
-                    for listener in list(self.listeners):
-                        listener(state)
+                    self._tell(state)
             except LinkError as error:
                 self.problem = str(error)
                 self._forget()
-            await asyncio.sleep(_RETRY_S)
+            if not self.is_lent:
+                await asyncio.sleep(_RETRY_S)
+
+    def _tell(self, state: State) -> None:
+        self.state = state
+        self.history.append(state)
+        for listener in list(self.listeners):
+            listener(state)
 
     async def _drive(self) -> None:
         """Send what is wanted, one at a time, always the newest."""

@@ -12,9 +12,11 @@ from bubbleskin.studio.array import Array
 from bubbleskin.studio.desk import Desk
 from bubbleskin.studio.owner import as_asked
 from bubbleskin.studio.panels.buttons import ButtonsPanel
+from bubbleskin.studio.panels.calibration import CalibrationPanel
 from bubbleskin.studio.panels.live import LivePanel, choose_device
 from bubbleskin.studio.panels.patterns import PatternPanel
 from bubbleskin.studio.panels.pulse import PulsePanel
+from bubbleskin.studio.panels.recorder import RecorderPanel
 from bubbleskin.studio.panels.terrain import TerrainPanel
 from bubbleskin.studio.widgets import text
 
@@ -35,6 +37,8 @@ PANELS: dict[str, tuple[str, Callable[[Desk, Array], Panel]]] = {
     "terrain": ("Terrain", TerrainPanel),
     "buttons": ("Buttons", ButtonsPanel),
     "patterns": ("Patterns", PatternPanel),
+    "recorder": ("Recorder", RecorderPanel),
+    "calibration": ("Calibration", CalibrationPanel),
 }
 """By the name in the address: what its tab says, and what makes it."""
 
@@ -65,7 +69,7 @@ class Page:
             text("h1", "bubbleskin studio")
             with ui.element("div").classes("told"):
                 self._where = text("span", "", "where")
-                self._facts = _Facts(("doing", "supply", "link", "clock", "pointer"))
+                self._facts = _Facts(("doing", "recording", "supply", "link", "clock", "pointer"))
             with ui.element("div").classes("safety"):
                 for what, key in (("stop", "Esc"), ("vent", "Esc Esc")):
                     with ui.element("button").classes(f"btn {what}").props(f'type="button" data-act="{what}"'):
@@ -92,6 +96,7 @@ class Page:
         self._place.clear()
         if self._array:
             self._array.on_bubble = self._array.on_choose = None
+            self._array.show_now(self._history())
         with self._place:
             if self._array:
                 self._panel = PANELS[name][1](self._desk, self._array)
@@ -104,8 +109,11 @@ class Page:
 
     def _connected(self) -> None:
         if self._array:
-            self._array.take_history(list(self._desk.owner.history)[::_HISTORY_EVERY])
+            self._array.take_history(self._history())
             self._desk.owner.listeners.add(self._take)
+
+    def _history(self) -> list[State]:
+        return list(self._desk.owner.history)[::_HISTORY_EVERY]
 
     def _take(self, state: State) -> None:
         if self._array and self._client.has_socket_connection:
@@ -122,6 +130,7 @@ class Page:
         self._where.text = as_asked(owner.url)
         self._facts.say(
             doing=_doing(owner.state, owner.activity),
+            recording=f"{recorded.seconds:.0f} s" if (recorded := self._desk.recorder.current) else "",
             supply=f"{owner.health.supply_kpa:.0f} kPa" if owner.health else "–",
             pointer=f"{1e3 * sorted(owner.latencies)[len(owner.latencies) // 2]:.0f} ms" if owner.latencies else "",
             **(_clock(owner.skin.clock, owner.state) if owner.skin else {}),

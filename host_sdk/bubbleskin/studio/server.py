@@ -8,21 +8,24 @@ import secrets
 import socket
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI, Request
-from fastapi.responses import JSONResponse
+from fastapi.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from nicegui import ui
 from nicegui.client import Client
 from starlette.staticfiles import StaticFiles
 
+from bubbleskin.browser.messages import WEB
 from bubbleskin.errors import InvalidInput
 from bubbleskin.studio.desk import Desk
 from bubbleskin.studio.files import STATIC
 from bubbleskin.studio.guard import Guard
 from bubbleskin.studio.owner import Owner
 from bubbleskin.studio.page import Page
+from bubbleskin.studio.recorder import Recorder
 
 _LAST_WORDS_S = 2
 """Seconds that open connections have at the end."""
@@ -34,10 +37,11 @@ _LOOK_S = 0.25
 class Studio:
     """A studio: made once in a process, as NiceGUI's pages are; `serve` runs it until `leave` or Ctrl-C.
 
-    Unless it `stays`, for other pages and notifications, it leaves by itself once its last page has been closed.
+    Unless it `stays`, for other pages and notifications, it leaves by itself once its last page has been closed. `folder`:
+    where its recordings stay; without one they go with it.
     """
 
-    def __init__(self, host: str, port: int, token: str = "", *, stays: bool = False):
+    def __init__(self, host: str, port: int, token: str = "", *, stays: bool = False, folder: Path | None = None):
         self.token = token or secrets.token_urlsafe(24)
         self._host = host
         self._stays = stays
@@ -46,7 +50,7 @@ class Studio:
         self.owner = Owner(attended=is_attended)
         shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
         self.address = f"http://{f'[{shown}]' if ':' in shown else shown}:{self.port}"
-        self.desk = Desk(self.owner, self.token, self.address)
+        self.desk = Desk(self.owner, self.token, self.address, Recorder(self.owner, folder))
         self._server: _Server | None = None
 
     @property
@@ -80,6 +84,7 @@ class Studio:
             watching.cancel()
             logging.getLogger("bubbleskin").removeHandler(notes)
             await self.owner.close()
+            await self.desk.recorder.close()
             self._socket.close()
 
     def leave(self) -> None:
@@ -102,6 +107,7 @@ class Studio:
     def _application(self) -> FastAPI:
         app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         app.mount("/studio", StaticFiles(directory=STATIC))
+        app.mount("/array", StaticFiles(directory=WEB))
         owner, desk = self.owner, self.desk
 
         @app.post("/stop")
@@ -114,6 +120,13 @@ class Studio:
             await owner.vent()
             return _answer(owner.problem)
 
+        @app.get("/recordings/{name}")
+        def recording(name: str) -> Response:
+            path = desk.recorder.file(name)
+            if path is None:
+                return PlainTextResponse("There is no such recording in this run.\n", 404)
+            return FileResponse(path, filename=name, headers={"Cache-Control": "no-store"})
+
         @app.post("/notify")
         async def notify() -> JSONResponse:
             return _answer(desk.notify())
@@ -125,6 +138,7 @@ class Studio:
         @ui.page("/", title="bubbleskin studio")
         def page(tab: str = "live") -> None:
             ui.add_head_html(
+                '<link rel="stylesheet" href="/array/palette.css"><link rel="stylesheet" href="/array/array.css">'
                 '<link rel="stylesheet" href="/studio/studio.css"><script defer src="/studio/stop.js"></script>'
             )
             Page(desk, tab)
@@ -191,8 +205,13 @@ def _listen(host: str, port: int) -> socket.socket:
     return listening
 
 
-def run(device: str, host: str, port: int, ready: Callable[[Studio], None], *, stays: bool) -> None:
-    """Serve until Ctrl-C or, unless it `stays`, the last page is closed; both vent. `ready` is told once pages can be opened."""
-    studio = Studio(host, port, stays=stays)
+def run(
+    device: str, host: str, port: int, ready: Callable[[Studio], None], *, stays: bool, folder: Path | None = None
+) -> None:
+    """Serve until Ctrl-C or, unless it `stays`, the last page is closed; both vent. `ready` is told once pages can be opened.
+
+    `folder`: where recordings stay.
+    """
+    studio = Studio(host, port, stays=stays, folder=folder)
     with contextlib.suppress(asyncio.CancelledError):
         asyncio.run(studio.serve(device, lambda: ready(studio)))

@@ -1,4 +1,4 @@
-// The array, live: one message a tick brings every height. Drawn as SVG in an orthographic projection, in which a sphere is a
+// The array, live: one message a tick brings every height; a component of the studio's page, and by widget.js of notebooks. Drawn as SVG in an orthographic projection, in which a sphere is a
 // circle from wherever it is seen: no 3-D hardware is needed, and every bubble is an element that can be focused and read.
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -34,6 +34,25 @@ function make(parent, tag, attributes = {}) {
   return node;
 }
 
+// How one looks at it is the browser tab's, where there is room for that: a notebook's frame may have none.
+function recall(name) {
+  try {
+    return sessionStorage.getItem(name);
+  } catch {
+    return null;
+  }
+}
+
+function keep(name, value) {
+  try {
+    sessionStorage.setItem(name, value);
+  } catch {
+    // as it was before
+  }
+}
+
+let arrays = 0; // in this page: names of shades differ
+
 const stamp = (event) => (performance.timeOrigin + event.timeStamp) / 1000;
 
 // Arrow keys go to the nearest bubble in their direction.
@@ -62,7 +81,8 @@ export default {
         </select></label>
         <div class="legend" aria-hidden="true"></div>
       </div>
-      <svg class="array-figure" role="group" :aria-label="'Array of ' + positions.length + ' bubbles'" preserveAspectRatio="xMidYMid meet"></svg>
+      <p class="recorded" role="status" hidden></p>
+      <svg class="array-figure" role="group" preserveAspectRatio="xMidYMid meet"></svg>
       <figure class="strip">
         <figcaption><span class="strip-title"></span>
           <span class="keys" aria-hidden="true"><i class="key line"></i>height <i class="key dash"></i>target <i class="key band"></i>± 1 sd</span></figcaption>
@@ -77,14 +97,15 @@ export default {
   props: { positions: Array, pitch: Number, rest: Number, max: Number, pressure: Number },
   mounted() {
     this.past = [];
+    this.recorded = "";
     this.latest = null;
     this.drawn = 0;
     this.due = false;
-    this.chosen = Math.min(Number(sessionStorage.getItem("bubble") || 0), this.positions.length - 1);
+    this.chosen = Math.min(Number(recall("bubble") || 0), this.positions.length - 1);
     for (const select of this.$el.querySelectorAll("select")) {
-      select.value = sessionStorage.getItem(select.dataset.keep) || select.value;
+      select.value = recall(select.dataset.keep) || select.value;
       select.addEventListener("change", () => {
-        sessionStorage.setItem(select.dataset.keep, select.value);
+        keep(select.dataset.keep, select.value);
         this.reset();
       });
     }
@@ -96,6 +117,19 @@ export default {
   methods: {
     // What the server calls.
 
+    record(what, message, before) {
+      // A moment of a recording, or, where `what` is empty, what is now again.
+      const said = this.$el.querySelector(".recorded");
+      if (this.recorded !== what) {
+        this.recorded = what;
+        said.textContent = what && `${what}: this is a recording, and not what the wristband does now.`;
+        said.hidden = !what;
+        this.$el.classList.toggle("is-recorded", Boolean(what));
+        this.newest.textContent = what ? "here" : "now";
+      }
+      this.past = before;
+      if (message) this.take(message);
+    },
     take(message) {
       this.latest = message;
       this.past.push(message);
@@ -152,8 +186,10 @@ export default {
 
     build() {
       this.svg = this.$el.querySelector(".array-figure");
+      this.svg.setAttribute("aria-label", `Array of ${this.positions.length} bubbles`);
+      this.shade = `shade-${(arrays += 1)}`;
       const defs = make(this.svg, "defs");
-      const shade = make(defs, "radialGradient", { id: "shade", cx: "38%", cy: "32%", r: "75%" });
+      const shade = make(defs, "radialGradient", { id: this.shade, cx: "38%", cy: "32%", r: "75%" });
       for (const [offset, colour, opacity] of [[0, "#fff", 0.55], [0.35, "#fff", 0.06], [0.75, "#000", 0.05], [1, "#000", 0.32]])
         make(shade, "stop", { offset, "stop-color": colour, "stop-opacity": opacity });
       this.plate = make(this.svg, "g", { class: "plate" });
@@ -174,7 +210,7 @@ export default {
       const group = make(this.layer, "g", { class: "bubble", role: "button", tabindex: bubble === this.chosen ? 0 : -1, "data-bubble": bubble });
       const parts = { group, foot: make(this.plate, "ellipse") };
       for (const part of ["doubt", "ghost", "ball", "light"]) parts[part] = make(group, "circle", { class: part });
-      parts.light.setAttribute("fill", "url(#shade)");
+      parts.light.setAttribute("fill", `url(#${this.shade})`);
       parts.label = make(this.labels, "text");
       parts.name = make(parts.label, "tspan", { class: "number" });
       parts.value = make(parts.label, "tspan");
@@ -245,7 +281,8 @@ export default {
     },
     words(bubble, now) {
       const faults = now.f[bubble] || [];
-      return `Bubble ${bubble}: ${now.h[bubble].toFixed(1)} mm, target ${now.g[bubble].toFixed(1)} mm, ${faults.join(", ") || now.s[bubble]}`;
+      const who = this.recorded ? `Recorded, bubble ${bubble}` : `Bubble ${bubble}`;
+      return `${who}: ${now.h[bubble].toFixed(1)} mm, target ${now.g[bubble].toFixed(1)} mm, ${faults.join(", ") || now.s[bubble]}`;
     },
     legend() {
       const legend = this.$el.querySelector(".legend");
@@ -275,7 +312,7 @@ export default {
 
     choose(bubble) {
       this.chosen = bubble;
-      sessionStorage.setItem("bubble", bubble);
+      keep("bubble", bubble);
       this.bubbles.forEach((parts, other) => parts.group.setAttribute("tabindex", other === bubble ? 0 : -1));
       this.$el.querySelector(".strip-title").textContent = `Bubble ${bubble}`;
       this.$emit("choose", { bubble });
@@ -309,7 +346,9 @@ export default {
       }
       for (let age = 0; age <= seconds; age += 5) {
         const anchor = age ? "middle" : "end";
-        make(this.grid, "text", { x: this.across(age), y: height - 5, "text-anchor": anchor }).textContent = age ? `−${age} s` : "now";
+        const label = make(this.grid, "text", { x: this.across(age), y: height - 5, "text-anchor": anchor });
+        label.textContent = age ? `−${age} s` : "now";
+        if (!age) this.newest = label;
       }
       make(this.grid, "text", { x: 2, y: top + 4 }).textContent = "mm";
     },
