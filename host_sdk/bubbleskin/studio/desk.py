@@ -15,6 +15,7 @@ from bubbleskin.errors import BubbleskinError, InvalidInput
 from bubbleskin.files import is_image
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.model import Sequence
+from bubbleskin.studio.editor import Editor
 from bubbleskin.studio.owner import Owner
 from bubbleskin.studio.widgets import Range
 
@@ -69,6 +70,10 @@ class Desk:
     pattern: str = "ripple"
     pressed: list[str] = field(default_factory=list)
     """What the buttons said, a line each, the newest last."""
+
+    def __post_init__(self) -> None:
+        self.editor = Editor(self.owner)
+        """The sequence that is edited."""
 
     @property
     def layout(self) -> Layout:
