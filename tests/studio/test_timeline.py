@@ -133,7 +133,9 @@ def test_a_keyframe_stands_where_it_is_put_and_no_other_moves(sequence, data):
         if number > index:
             assert other.end - one.end in (0, shift)
             assert edits.is_wait(sequence.each[number]) or other.arrival - one.arrival in (0, shift)
-    if before[index].begin + 10 <= at < min(before[index].end, before[index].begin + 60_000):  # in its own step there is room
+    if (
+        before[index].begin + 10 <= at < min(before[index].end, before[index].begin + 60_000)
+    ):  # in its own step there is room
         assert after_it[index].arrival == at
 
 

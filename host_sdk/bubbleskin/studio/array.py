@@ -46,6 +46,10 @@ class Array(Element, component=STATIC / "array.js"):
         """Show what was before this page was opened."""
         self.run_method("history", [message(state) for state in states])
 
+    def foresee(self, tops_mm: list[float] | None) -> None:
+        """Show besides where the bubbles would stand, (n,); None: nothing besides."""
+        self.run_method("foresee", tops_mm)
+
     def _bubble(self, event: GenericEventArguments) -> None:
         if self.on_bubble:
             self.on_bubble(event.args)

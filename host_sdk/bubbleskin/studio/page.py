@@ -15,6 +15,7 @@ from bubbleskin.studio.panels.buttons import ButtonsPanel
 from bubbleskin.studio.panels.live import LivePanel, choose_device
 from bubbleskin.studio.panels.patterns import PatternPanel
 from bubbleskin.studio.panels.pulse import PulsePanel
+from bubbleskin.studio.panels.sequence import SequencePanel
 from bubbleskin.studio.panels.terrain import TerrainPanel
 from bubbleskin.studio.widgets import text
 
@@ -35,6 +36,7 @@ PANELS: dict[str, tuple[str, Callable[[Desk, Array], Panel]]] = {
     "terrain": ("Terrain", TerrainPanel),
     "buttons": ("Buttons", ButtonsPanel),
     "patterns": ("Patterns", PatternPanel),
+    "sequence": ("Sequence", SequencePanel),
 }
 """By the name in the address: what its tab says, and what makes it."""
 
@@ -92,6 +94,8 @@ class Page:
         self._place.clear()
         if self._array:
             self._array.on_bubble = self._array.on_choose = None
+            if self._client.has_socket_connection:
+                self._array.foresee(None)
         with self._place:
             if self._array:
                 self._panel = PANELS[name][1](self._desk, self._array)
