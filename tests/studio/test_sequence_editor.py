@@ -42,10 +42,11 @@ def edit(studio, visit):
 
     def open_page(sequence, **file):
         page = visit("sequence")
+        studio.studio.desk.editor.timeline.rows_are = "bubbles"  # whatever the test before has left
         upload(page, sequence.to_json(), **file)
         assert studio.until(lambda: edited(studio) == sequence)
         page.wait_for_function("n => document.querySelectorAll('[data-step]').length === n", arg=len(sequence.each))
-        studio.until(lambda: (now := studio.studio.desk.editor.forecast) and now.sequence is edited(studio))
+        assert studio.until(lambda: (now := studio.studio.desk.editor.forecast) and now.sequence is edited(studio))
         return page
 
     return open_page
@@ -131,7 +132,7 @@ def test_all_of_it_by_keyboard(studio, edit):
     assert studio.until(lambda: edited(studio).each[1].targets_mm[1] is None)
     for _ in range(9):
         page.keyboard.press("Control+z")
-    assert studio.until(lambda: edited(studio) == short(6.0, 7.0))
+    assert studio.until(lambda: edited(studio) == short(6.0, 7.0), 5), edited(studio).to_json()
     page.keyboard.press("Control+y")
     assert studio.until(lambda: edited(studio).each[1].targets_mm[1] == 7.1)
 
@@ -178,7 +179,7 @@ def test_every_field_of_a_step_is_set(studio, edit):
     page.get_by_label("Goes on").select_option("settled")
     page.get_by_label("At most (s)").fill("1.5")
     page.keyboard.press("Enter")
-    page.get_by_label("Then").select_option("vent")
+    page.get_by_role("combobox", name="Then").select_option("vent")
     page.get_by_label("Step's name").fill("peak")
     page.keyboard.press("Enter")
     page.get_by_label("All of it, times").fill("2")
@@ -202,14 +203,15 @@ def test_steps_are_repeated_and_rows_are_rings(studio, edit):
     page.keyboard.press("Enter")
     assert studio.until(lambda: getattr(edited(studio).steps[0], "times", 0) == 4)
     page.get_by_role("combobox", name="Rows").select_option("rings")
+    page.get_by_text("Ring 1").wait_for()
     keyframe(page, 1, 2).focus()
     page.keyboard.press("PageUp")
     assert studio.until(lambda: edited(studio).each[2].targets_mm == (8.0, *[9.0] * 6))
 
 
 def test_the_foreseen_shape_is_what_the_plant_then_has(studio, edit):
-    """Bubbles that touch: the one in the middle is lifted by a ring that comes after it."""
-    touching = bs.Sequence([bs.Step([8.5, *[9.0] * 6], 1.0), bs.Step([None, *[10.4] * 6], 1.0, until=bs.After(0.5))])
+    """Bubbles that touch: the one in the middle rises last and is lifted by the ring around it."""
+    touching = bs.Sequence([bs.Step([8.0, *[10.0] * 6], 1.0), bs.Step([11.0, *[None] * 6], 1.0, until=bs.After(0.5))])
     page = edit(touching)
     page.locator("[data-step='1']").focus()
     page.get_by_role("slider", name="Playhead").focus()
@@ -220,7 +222,7 @@ def test_the_foreseen_shape_is_what_the_plant_then_has(studio, edit):
     tops = np.array([float(one) for one in page.evaluate(f"({foreseen})().map(b => b.dataset.foreseen)")])
     forecast = studio.studio.desk.editor.forecast
     assert forecast.cut_mm is None
-    assert np.abs(tops - np.array([8.5, *[10.4] * 6])).max() > 0.3  # not what was asked
+    assert np.abs(tops - np.array([11.0, *[10.0] * 6])).max() > 1  # not what was asked
     page.get_by_role("button", name="Play", exact=True).click()
     assert studio.until(lambda: studio.owner.played and studio.owner.played.step == 1)
     assert studio.until(lambda: not studio.owner.plays)
@@ -236,6 +238,7 @@ def test_what_cannot_be_had_is_marked(studio, edit):
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+y")
     page.get_by_role("combobox", name="Rows").select_option("all")
+    page.get_by_text("All", exact=True).wait_for()
     keyframe(page, 0, 1).focus()
     for _ in range(6):
         page.keyboard.press("PageDown")
@@ -340,7 +343,7 @@ def test_the_library_and_a_pattern_are_opened(studio, edit):
     line.fill("wave.slow(2)")
     page.get_by_role("slider", name="Length").fill("3")
     page.get_by_role("button", name="Make keyframes of it").click()
-    assert studio.until(lambda: edited(studio).name == "wave.slow(2)")
+    assert studio.until(lambda: edited(studio).name == "wave().slow(2)")
     assert edited(studio).duration == 4.0
     page.get_by_role("button", name="Play", exact=True).click()
     assert studio.until(lambda: np.ptp(studio.heights) > 1)

@@ -19,23 +19,35 @@ SAID_MAX = 6
 
 
 class Chart(Element, component=STATIC / "timeline.js"):
-    """The timeline of the `editor`'s sequence. `act(kind, message)` is called with what a hand does: change, choose or look."""
+    """The timeline of the `editor`'s sequence. `act(kind, message)` is called with what a hand does: edit, choose or look."""
 
     def __init__(self, editor: Editor, layout: Layout, act: Callable[[str, Message], None]):
         super().__init__()
         self._editor, self._layout, self._act = editor, layout, act
+        self._answering = False
         self._shown = -1
         self._outlook: object = None
         self._looks = -1
         self.props.update(easings=list(EASINGS), thens=list(THEN), first=self._message())
-        for kind in ("change", "choose", "look"):
+        for kind in ("edit", "choose", "look"):
             self.on(kind, self._asked(kind))
 
     def _asked(self, kind: str) -> Callable[[GenericEventArguments], None]:
         return lambda event: self._act(kind, event.args if isinstance(event.args, dict) else {})
 
+    def answer(self, act: Callable[[], None]) -> None:
+        """Do what this page waits for, and tell it all that came of it in one message."""
+        self._answering = True
+        try:
+            act()
+        finally:
+            self._answering = False
+            self.show(answer=True)
+
     def show(self, *, answer: bool = False) -> None:
-        """Bring the page up to date; `answer`: this page has asked for a change and waits."""
+        """Bring the page up to date."""
+        if self._answering:
+            return
         if answer or self._looks != self._editor.looks or self._shown != self._editor.timeline.revision:
             self.run_method("take", self._message() | {"answer": answer, "problem": self._editor.problem})
 

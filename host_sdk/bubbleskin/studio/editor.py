@@ -50,7 +50,13 @@ class Editor:
 
     @property
     def timeline(self) -> Timeline:
-        """For the wristband that there is; `InvalidInput` where there never was one."""
+        """What is edited; `InvalidInput` where there never was a wristband."""
+        if self._timeline is None:
+            raise InvalidInput(self._owner.problem or "No wristband is connected.")
+        return self._timeline
+
+    def meet(self) -> None:
+        """Know the wristband that there is, which may be another."""
         skin = self._owner.skin
         if skin is not None and skin is not self._skin:
             self._skin = skin
@@ -58,9 +64,6 @@ class Editor:
             self._foresight = Foresight(skin.layout, skin.info, touch=touch)
             self._fit(skin)
             self._think()
-        if self._timeline is None:
-            raise InvalidInput(self._owner.problem or "No wristband is connected.")
-        return self._timeline
 
     def _fit(self, skin: AsyncSkin) -> None:
         """Keep what is edited, whatever wristband it is for; only what nobody has touched is made for this one."""
@@ -106,6 +109,7 @@ class Editor:
         ending = Path(name).suffix.lower()
         if ending not in FILES:
             return f"{ending or 'A file without an ending'} is no sequence; {', '.join(FILES)} are."
+        self.meet()
         try:
             sequence = await asyncio.to_thread(_read, Path(name).stem[:40] or "sequence", ending, data)
             self._become(sequence)
@@ -117,6 +121,7 @@ class Editor:
 
     def saved(self) -> tuple[str, str]:
         """The name of a file, and what is in it."""
+        self.meet()
         sequence = self.timeline.sequence
         name = re.sub(r"[^A-Za-z0-9_-]+", "-", sequence.name).strip("-")[:40]
         return f"{name or 'sequence'}.json", sequence.to_json()

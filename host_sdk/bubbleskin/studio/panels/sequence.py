@@ -18,6 +18,7 @@ class SequencePanel:
 
     def __init__(self, desk: Desk, array: Array):
         self._desk, self._editor, self._array = desk, desk.editor, array
+        self._editor.meet()
         self._foreseen: object = self  # what was shown last on the array: nothing yet
         self._named = next(iter(LIBRARY))
         self._seconds = 8.0
@@ -46,9 +47,8 @@ class SequencePanel:
     # What a hand does.
 
     def _asked(self, kind: str, what: Message) -> None:
-        if kind == "change":
-            self._editor.change(what)
-            self._chart.show(answer=True)
+        if kind == "edit":
+            self._chart.answer(lambda: self._editor.change(what))
         elif kind == "choose":
             self._editor.choose(what)
         else:

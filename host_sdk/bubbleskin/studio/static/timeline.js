@@ -22,7 +22,7 @@ export default {
       <div class="row timeline-tools">
         <button type="button" class="btn" :disabled="!doc.undo" @click="send(() => ({ kind: 'undo' }))">Undo</button>
         <button type="button" class="btn" :disabled="!doc.redo" @click="send(() => ({ kind: 'redo' }))">Redo</button>
-        <label>Rows <select aria-label="Rows" :value="doc.rows_are" @change="send(() => ({ kind: 'rows', rows: $event.target.value }))">
+        <label>Rows <select aria-label="Rows" :value="doc.rows_are" @change="show_rows($event.target.value)">
           <option value="bubbles">Bubbles</option><option value="rings">Rings</option><option value="all">All together</option></select></label>
         <span class="zooms" role="group" aria-label="Zoom">
           <button type="button" class="btn" aria-label="Zoom out" @click="zoom_by(1 / 1.6)">−</button>
@@ -82,6 +82,7 @@ export default {
       <label class="upload"><span>Open a file: a sequence as .json, a timeline as .csv</span>
         <input type="file" accept=".json,.csv,.tsv,.txt" @change="upload($event.target)"></label>
     </div>`,
+  emits: ["edit", "choose", "look"], // and no "change", which the fields within send too
   props: { first: Object, easings: Array, thens: Array },
   data() {
     const first = JSON.parse(JSON.stringify(this.first)); // what Vue watches cannot be frozen
@@ -179,14 +180,16 @@ export default {
       Object.assign(this, parts, { problem: message.problem });
       if (this.doc.steps.length <= this.chosen.step) this.chosen = { step: 0, last: 0, row: -1 };
       this.draw_head();
-      if (message.answer) {
-        this.answers += 1;
-        this.waiting = false;
-        this.$nextTick(() => {
-          if (held) this.$el.querySelector(`[data-key='${this.focus}'], [data-step='${this.focus.slice(1)}']`)?.focus({ preventScroll: true });
-          this.pump();
-        });
-      }
+      if (message.answer) this.waiting = false;
+      if (message.problem) this.answers += 1; // fields say again what there is
+      this.$nextTick(() => {
+        if (held && !this.$refs.svg.contains(document.activeElement)) this.focus_chosen(); // what had the focus is gone
+        this.pump();
+      });
+    },
+    focus_chosen() {
+      const { focus } = this;
+      this.$el.querySelector(focus[0] === "s" ? `[data-step='${focus.slice(1)}']` : `[data-key='${focus}']`)?.focus({ preventScroll: true });
     },
     send(make) {
       this.queue.push(make); // made when its turn comes, of what there is then
@@ -197,13 +200,16 @@ export default {
         const what = this.queue.shift()();
         if (!what) continue;
         this.waiting = true;
-        this.$emit("change", { revision: this.doc.revision, ...what });
+        this.$emit("edit", { revision: this.doc.revision, ...what });
         clearTimeout(this.patience);
         this.patience = setTimeout(() => {
           this.waiting = false;
           this.queue = [];
         }, ANSWER_MS);
       }
+    },
+    show_rows(rows) {
+      this.send(() => ({ kind: "rows", rows }));
     },
     async upload(input) {
       const [file] = input.files;
@@ -290,7 +296,7 @@ export default {
       this.choose(one.step, one.row, event.shiftKey);
       this.$refs.svg.setPointerCapture(event.pointerId);
       this.held = { ...one, at: [event.clientX, event.clientY], moved: [false, false] };
-      this.$nextTick(() => this.$el.querySelector(`[data-key='${one.key}']`)?.focus({ preventScroll: true }));
+      this.$nextTick(this.focus_chosen);
       event.preventDefault();
     },
     drag_on(event) {
@@ -341,7 +347,7 @@ export default {
       if (!this.doc.steps[step]) return;
       this.choose(step, row);
       this.reveal(this.doc.steps[step].arrival);
-      this.$nextTick(() => this.$el.querySelector(`[data-key='${this.focus}'], [data-step='${this.focus.slice(1)}']`)?.focus());
+      this.$nextTick(this.focus_chosen);
     },
     reveal(ms) {
       const box = this.$refs.scroll;
@@ -354,6 +360,9 @@ export default {
       const act = undo ? () => this.send(() => ({ kind: undo })) : event.shiftKey ? this.moves()[event.key] : this.plain()[event.key];
       if (!act || (!undo && (event.ctrlKey || event.altKey || event.metaKey))) return;
       event.preventDefault();
+      const [row, step] = (event.target.dataset.key || `-1-${event.target.dataset.step}`).split(/(?<=\d)-/).map(Number);
+      if (step >= 0 && !this.within(step)) this.focused(step, row);
+      else if (row >= 0) this.focused(step, row);
       act();
     },
     moves() {
