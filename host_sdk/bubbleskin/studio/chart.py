@@ -7,7 +7,7 @@ from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
 from bubbleskin.layout import Layout
-from bubbleskin.sequence.steps import EASINGS, THEN, Settled, Step
+from bubbleskin.sequence.steps import EASINGS, THEN, After, Step
 from bubbleskin.studio import edits
 from bubbleskin.studio.editor import Editor
 from bubbleskin.studio.files import STATIC
@@ -93,14 +93,13 @@ def document(timeline: Timeline, layout: Layout) -> Message:
 
 def _step(step: Step) -> dict[str, Any]:
     until = step.until
-    settles = isinstance(until, Settled)
     return {
         "name": step.name,
         "ramp": step.ramp,
         "easing": step.easing,
         "targets": None if edits.is_wait(step) else step.targets_mm,
-        "after": None if isinstance(until, Settled) else until.seconds,
-        "settled": [until.tolerance_mm, until.timeout_s, until.then] if settles else None,
+        "after": until.seconds if isinstance(until, After) else None,
+        "settled": None if isinstance(until, After) else [until.tolerance_mm, until.timeout_s, until.then],
     }
 
 

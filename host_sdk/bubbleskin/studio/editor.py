@@ -85,7 +85,7 @@ class Editor:
 
     def choose(self, what: Message) -> None:
         """Choose a keyframe or steps."""
-        self._try(lambda: self.timeline.choose(what.get("step"), what.get("last"), what.get("row")))
+        self._try(lambda: self.timeline.choose(*(what.get(name, 0) for name in ("step", "last", "row"))))
 
     def look_at(self, time_ms: float) -> None:
         """Put the playhead somewhere."""
@@ -160,6 +160,7 @@ class Editor:
 
     def _fail(self, error: BubbleskinError) -> None:
         self.problem = str(error)
+        self.looks += 1
         self._tell()
 
     def _tell(self) -> None:

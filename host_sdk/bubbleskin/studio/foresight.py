@@ -23,7 +23,7 @@ from bubbleskin.surface.compensate import SHORT_MM
 from bubbleskin.surface.gaps import Gaps
 from bubbleskin.surface.kept import KeptShape
 from bubbleskin.surface.limits import Limits
-from bubbleskin.surface.played import cut, highest_cut
+from bubbleskin.surface.played import MANY, OTHERS, cut, highest_cut
 
 if TYPE_CHECKING:
     from bubbleskin.contact.held import HeldShape
@@ -32,10 +32,6 @@ Array = NDArray[np.float64]
 
 _FOLLOWED = 4000
 """Steps that are followed at most."""
-_MANY = 200
-"""Of more steps only the likeliest wristband is followed, as `play` does."""
-_OTHERS = (2, 4)
-"""Those of the others in which bubbles are lifted most."""
 
 
 class _Played(NamedTuple):
@@ -106,12 +102,16 @@ class Forecast:
         return said[:most]
 
     def _say_off(self, step: int, off: list[tuple[int, int]]) -> str:
-        targets, tops = self.sequence.each[step].targets_mm, self.first[step].tops
-        assert targets is not None
-        most = max((bubble for _, bubble in off), key=lambda bubble: abs(tops[bubble] - targets[bubble]))
+        tops = self.first[step].tops
+        asked = {
+            bubble: target
+            for bubble, target in enumerate(self.sequence.each[step].targets_mm or ())
+            if target is not None
+        }
+        most = max((bubble for _, bubble in off), key=lambda bubble: abs(tops[bubble] - asked[bubble]))
         others = len(off) - 1
         more = f"; {others} other{'s are' if others > 1 else ' is'} off too" if others else ""
-        return f"{self.sequence.say(step)}: bubble {most} would stand {tops[most]:.1f} mm high, not {targets[most]:.1f} mm{more}."
+        return f"{self.sequence.say(step)}: bubble {most} would stand {tops[most]:.1f} mm high, not {asked[most]:.1f} mm{more}."
 
 
 class Foresight:
@@ -163,7 +163,7 @@ class Foresight:
     def _follow(
         self, sequence: Sequence, order: list[int], wanted: Callable[[], bool], *, is_cut: bool
     ) -> list[_Played] | None:
-        others = _OTHERS if len(order) <= _MANY else ()
+        others = OTHERS if len(order) <= MANY else ()
         asked = self._asked(sequence, order)
         before, same = self._followed[is_cut], 0
         while same < min(len(before), len(asked)) and np.array_equal(before[same].alone, asked[same]):

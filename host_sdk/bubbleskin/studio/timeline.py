@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from bubbleskin.checks import number, one_of, whole
@@ -191,11 +192,18 @@ def _delete(timeline: Timeline, what: Message, rows: list[Row]) -> None:
 
 
 def _step(timeline: Timeline, what: Message, rows: list[Row]) -> None:
+    index = int(what["step"])
     given: Message = {name: what[name] for name in ("ramp", "easing", "name") if name in what}
     if "until" in what:
-        until = dict(what["until"])
-        given["until"] = After(until["after"]) if "after" in until else Settled(**until)
-    timeline.become(edits.with_step(timeline.sequence, int(what["step"]), **given))
+        given["until"] = _until(dict(what["until"]), timeline.sequence.each[index].until)
+    timeline.become(edits.with_step(timeline.sequence, index, **given))
+
+
+def _until(what: Message, before: After | Settled) -> After | Settled:
+    """What goes on after a time, or when settled: then what is not given is as `before`."""
+    if "after" in what:
+        return After(what["after"])
+    return replace(before if isinstance(before, Settled) else Settled(), **what)
 
 
 def _repeat(timeline: Timeline, what: Message, rows: list[Row]) -> None:

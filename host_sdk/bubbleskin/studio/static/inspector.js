@@ -1,27 +1,41 @@
-// The keyframe or the steps that are chosen, as fields. A value is said when it has been given, not at every key.
+// The keyframe or the steps that are chosen, as fields. A value is said when it has been given, not at every key; what is still
+// being typed stays, whatever the server says meanwhile.
+
+const show = (field, { value }) => {
+  if (!field.typed) field.value = value ?? "";
+};
+const given = {
+  mounted(field, binding) {
+    field.addEventListener("input", () => (field.typed = true));
+    field.addEventListener("change", () => (field.typed = false));
+    show(field, binding);
+  },
+  updated: show,
+};
 
 export default {
+  directives: { given },
   template: `
     <fieldset class="inspector" v-if="one">
-      <legend>{{ row && set.length ? row.name + ", step " + chosen.step : several ? "Steps " + from + " to " + to : "Step " + chosen.step }}</legend>
+      <legend>{{ row && set.length ? row.name + ", step " + chosen.step : several ? "Steps " + from + " to " + to + "; the fields are those of step " + chosen.step : "Step " + chosen.step }}</legend>
       <div class="fields" :data-answers="answers">
-        <label v-if="row">Height (mm) <input type="number" :min="0" :max="doc.high" step="0.1" :value="height" :placeholder="set.length ? 'not all alike' : 'as it is'"
+        <label v-if="row">Height (mm) <input type="number" :min="0" :max="doc.high" step="0.1" v-given="height" :placeholder="set.length ? 'not all alike' : 'as it is'"
           @change="say({ kind: 'place', step: chosen.step, row: chosen.row, height: numbered($event) })"></label>
-        <label>Ramp (s) <input type="number" min="0" max="60" step="0.05" :value="one.ramp" @change="step({ ramp: numbered($event) })"></label>
-        <label>Easing <select :value="one.easing" @change="step({ easing: $event.target.value })"><option v-for="word in easings">{{ word }}</option></select></label>
-        <label>Goes on <select :value="one.settled ? 'settled' : 'after'" @change="go_on($event.target.value)">
+        <label>Ramp (s) <input type="number" min="0" max="60" step="0.05" v-given="one.ramp" @change="step({ ramp: numbered($event) })"></label>
+        <label>Easing <select v-given="one.easing" @change="step({ easing: $event.target.value })"><option v-for="word in easings">{{ word }}</option></select></label>
+        <label>Goes on <select v-given="one.settled ? 'settled' : 'after'" @change="go_on($event.target.value)">
           <option value="after">after a time</option><option value="settled">when settled</option></select></label>
-        <label v-if="!one.settled">Wait (s) <input type="number" min="0" max="60" step="0.05" :value="one.after" @change="step({ until: { after: numbered($event) } })"></label>
+        <label v-if="!one.settled">Wait (s) <input type="number" min="0" max="60" step="0.05" v-given="one.after" @change="step({ until: { after: numbered($event) } })"></label>
         <template v-else>
-          <label>Within (mm) <input type="number" min="0.05" max="5" step="0.05" :value="one.settled[0]" @change="settled(0, numbered($event))"></label>
-          <label>At most (s) <input type="number" min="0" max="60" step="0.1" :value="one.settled[1]" @change="settled(1, numbered($event))"></label>
-          <label>Then <select :value="one.settled[2]" @change="settled(2, $event.target.value)"><option v-for="word in thens">{{ word }}</option></select></label>
+          <label>Within (mm) <input type="number" min="0.05" max="5" step="0.05" v-given="one.settled[0]" @change="step({ until: { tolerance_mm: numbered($event) } })"></label>
+          <label>At most (s) <input type="number" min="0" max="60" step="0.1" v-given="one.settled[1]" @change="step({ until: { timeout_s: numbered($event) } })"></label>
+          <label>Then <select v-given="one.settled[2]" @change="step({ until: { then: $event.target.value } })"><option v-for="word in thens">{{ word }}</option></select></label>
         </template>
-        <label>Step's name <input type="text" maxlength="60" :value="one.name" @change="step({ name: $event.target.value })"></label>
-        <label v-for="around in repeats">Repeat of {{ around.first }} to {{ around.last }} <input type="number" min="0" max="65535" :value="around.times"
+        <label>Step's name <input type="text" maxlength="200" v-given="one.name" @change="step({ name: $event.target.value })"></label>
+        <label v-for="around in repeats">Repeat of {{ around.first }} to {{ around.last }} <input type="number" min="0" max="65535" v-given="around.times"
           @change="say({ kind: 'times', path: around.path, times: numbered($event) })"></label>
-        <label>All of it, times <input type="number" min="0" max="65535" :value="doc.loops" @change="say({ kind: 'whole', loops: numbered($event) })"></label>
-        <label>Sequence's name <input type="text" maxlength="60" :value="doc.name" @change="say({ kind: 'whole', name: $event.target.value })"></label>
+        <label>All of it, times <input type="number" min="0" max="65535" v-given="doc.loops" @change="say({ kind: 'whole', loops: numbered($event) })"></label>
+        <label>Sequence's name <input type="text" maxlength="200" v-given="doc.name" @change="say({ kind: 'whole', name: $event.target.value })"></label>
       </div>
       <div class="row">
         <button type="button" class="btn" @click="$emit('add')">Add a keyframe at the playhead</button>
@@ -64,12 +78,8 @@ export default {
     step(what) {
       this.say({ kind: "step", step: this.chosen.step, ...what });
     },
-    settled(place, value) {
-      const [tolerance_mm, timeout_s, then] = this.one.settled.map((old, at) => (at === place ? value : old));
-      this.step({ until: { tolerance_mm, timeout_s, then } });
-    },
     go_on(how) {
-      this.step({ until: how === "settled" ? { tolerance_mm: 0.2, timeout_s: 3, then: this.thens[0] } : { after: 0 } });
+      this.step({ until: how === "settled" ? {} : { after: 0 } });
     },
     numbered(event) {
       return event.target.value === "" ? null : Number(event.target.value);
