@@ -54,7 +54,7 @@ class Chart(Element, component=STATIC / "timeline.js"):
     def _message(self) -> Message:
         """What is another since the last one."""
         timeline, forecast = self._editor.timeline, self._editor.forecast
-        message: Message = {"look": look(timeline)}
+        message: Message = {"look": look(timeline) | {"plays": self._editor.plays}}
         if self._shown != timeline.revision:
             message["doc"] = document(timeline, self._layout)
         now = forecast if forecast and forecast.sequence is timeline.sequence else None

@@ -38,7 +38,7 @@ class _Played(NamedTuple):
     """A step that is played."""
 
     begin: "list[HeldShape]"
-    """The likeliest wristband, and others, before it."""
+    """The likeliest wristband, and others, before it; none where neighbours do not push each other."""
     alone: Array
     """Heights alone that are asked at its end, mm."""
     end: "list[HeldShape]"
@@ -82,10 +82,13 @@ class Forecast:
         played = self.first.get(index)
         if played is None:
             return None
-        shape = played.begin[0].copy()
         asked = np.array(edits.heights_at(self.sequence, time_ms, self.rest_mm))
-        shape.go(np.minimum(asked, np.inf if self.cut_mm is None else self.cut_mm))
-        return [round(top, 2) for top in shape.height_mm.tolist()]
+        tops = np.minimum(asked, np.inf if self.cut_mm is None else self.cut_mm)
+        if played.begin:
+            shape = played.begin[0].copy()
+            shape.go(tops)
+            tops = shape.height_mm
+        return [round(top, 2) for top in tops.tolist()]
 
     def sentences(self, most: int) -> list[str]:
         """What there is to say, at most so many sentences."""
@@ -165,6 +168,8 @@ class Foresight:
     ) -> list[_Played] | None:
         others = OTHERS if len(order) <= MANY else ()
         asked = self._asked(sequence, order)
+        if not self._limits.gaps:
+            return [_Played([], alone, [], alone, passes=False) for alone in asked]
         before, same = self._followed[is_cut], 0
         while same < min(len(before), len(asked)) and np.array_equal(before[same].alone, asked[same]):
             same += 1

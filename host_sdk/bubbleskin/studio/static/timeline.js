@@ -180,6 +180,7 @@ export default {
       Object.assign(this, parts, { problem: message.problem });
       if (this.doc.steps.length <= this.chosen.step) this.chosen = { step: 0, last: 0, row: -1 };
       this.draw_head();
+      if (message.look.plays) this.reveal(this.time);
       if (message.answer) this.waiting = false;
       if (message.problem) this.answers += 1; // fields say again what there is
       this.$nextTick(() => {
