@@ -29,14 +29,14 @@ def tops(forecast):
 
 @pytest.mark.medium
 def test_what_was_reckoned_before_makes_no_difference(skin, foresight):
-    pulse = LIBRARY["pulse"](skin.layout)
+    wave = LIBRARY["wave"](skin.layout)
     variants = [
-        pulse,
-        edits.with_step(pulse, 2, ramp=0.9),
-        edits.with_targets(pulse, 5, [2], 7.0),
-        edits.without_step(pulse, 0),
-        edits.repeated(pulse, 1, 3, 2),
-        pulse,
+        wave,
+        edits.with_step(wave, 2, ramp=0.9),
+        edits.with_targets(wave, 5, [2], 7.0),
+        edits.without_step(wave, 0),
+        edits.repeated(wave, 1, 3, 2),
+        wave,
     ]
     for sequence in variants:
         kept, fresh = foresight.follow(sequence), Foresight(skin.layout, skin.info, touch=True).follow(sequence)
@@ -44,7 +44,6 @@ def test_what_was_reckoned_before_makes_no_difference(skin, foresight):
         assert (kept.cut_mm, kept.passes, kept.off()) == (fresh.cut_mm, fresh.passes, fresh.off())
 
 
-@pytest.mark.medium
 def test_it_is_cut_where_play_cuts_it(skin, foresight, caplog):
     forecast = foresight.follow(LIBRARY["breathing"](skin.layout, loops=1))
     skin.vent()
@@ -88,5 +87,8 @@ def test_what_play_would_refuse_is_said_with_its_reason(skin, foresight):
 
 
 def test_what_is_not_wanted_any_more_is_left(foresight):
-    assert foresight.follow(LIFTED, lambda: False) is None
+    breathing = LIBRARY["breathing"](bs.Layout.hexagon())
+    for looks in (0, 1, 3, 9):
+        left = iter([True] * looks)
+        assert foresight.follow(breathing, lambda left=left: next(left, False)) is None
     assert foresight.follow(LIFTED).off() == [(1, 0)]

@@ -103,7 +103,6 @@ def test_any_change_undone_is_as_it_was_and_done_again_as_it_became(sequence, da
         assert timeline.sequence.to_json() == later
 
 
-@pytest.mark.medium
 @settings(max_examples=25)
 @given(sequences())
 def test_what_is_opened_is_saved_as_it_was(sequence):
@@ -119,7 +118,6 @@ def test_every_sequence_of_the_library_is_saved_as_it_was(name, rings):
     assert Timeline(bs.Sequence.from_json(text)).sequence.to_json() == text
 
 
-@pytest.mark.medium
 @settings(max_examples=30)
 @given(sequences(), st.data())
 def test_a_keyframe_stands_where_it_is_put_and_no_other_moves(sequence, data):
@@ -139,7 +137,6 @@ def test_a_keyframe_stands_where_it_is_put_and_no_other_moves(sequence, data):
         assert after_it[index].arrival == at
 
 
-@pytest.mark.medium
 @settings(max_examples=30)
 @given(sequences(), st.data())
 def test_a_new_keyframe_is_where_it_was_asked_and_changes_no_other_row(sequence, data):

@@ -117,6 +117,21 @@ class Forecast:
         return f"{self.sequence.say(step)}: bubble {most} would stand {tops[most]:.1f} mm high, not {asked[most]:.1f} mm{more}."
 
 
+class _UnwantedError(Exception):
+    """Nobody waits for it any more."""
+
+
+class _Limits(Limits):
+    """Those of a board, as long as somebody wants to know."""
+
+    wanted: Callable[[], bool] = staticmethod(lambda: True)
+
+    def keeps(self, members: "list[HeldShape]", alone_mm: Array) -> bool:
+        if not self.wanted():
+            raise _UnwantedError
+        return super().keeps(members, alone_mm)
+
+
 class Foresight:
     """Follows sequences for one wristband. What did not change since the last one is not reckoned again.
 
@@ -126,7 +141,7 @@ class Foresight:
     def __init__(self, layout: Layout, info: Info, *, touch: bool):
         self._layout, self._info = layout, info
         gaps = Gaps(layout, info.height_max_mm if touch else 0.0)
-        self._limits = Limits(gaps, info.height_rest_mm, info.height_max_mm)
+        self._limits = _Limits(gaps, info.height_rest_mm, info.height_max_mm)
         self._followed: dict[bool, list[_Played]] = {False: [], True: []}
         self._cut: tuple[list[list[float]], float | None] = [], None
 
@@ -139,17 +154,17 @@ class Foresight:
             refused = str(error)
         if sequence.bubbles != len(self._layout):
             return Forecast(sequence, refused, by=self)
+        self._limits.wanted = wanted
         order, never = played_order(sequence)
-        played = self._follow(sequence, order, wanted, is_cut=False)
-        if played is None:
-            return None
-        passes = tuple(sorted({index for index, one in zip(order, played, strict=True) if one.passes}))
         cut_mm = None
-        if passes and not refused:
-            cut_mm = self._highest_cut(sequence, played)
+        try:
+            played = self._follow(sequence, order, is_cut=False)
+            passes = tuple(sorted({index for index, one in zip(order, played, strict=True) if one.passes}))
+            if passes and not refused:
+                cut_mm = self._highest_cut(sequence, played)
             if cut_mm is not None:
-                played = self._follow(cut(sequence, cut_mm), order, wanted, is_cut=True)
-        if played is None:
+                played = self._follow(cut(sequence, cut_mm), order, is_cut=True)
+        except _UnwantedError:
             return None
         first = dict(reversed(list(zip(order, played, strict=True))))
         return Forecast(sequence, refused, cut_mm, passes, tuple(never), first, self._info.height_rest_mm, self)
@@ -163,9 +178,7 @@ class Foresight:
     def _flat(self) -> KeptShape:
         return KeptShape(self._layout, self._limits.gaps, self._limits.rest_mm)
 
-    def _follow(
-        self, sequence: Sequence, order: list[int], wanted: Callable[[], bool], *, is_cut: bool
-    ) -> list[_Played] | None:
+    def _follow(self, sequence: Sequence, order: list[int], *, is_cut: bool) -> list[_Played]:
         others = OTHERS if len(order) <= MANY else ()
         asked = self._asked(sequence, order)
         if not self._limits.gaps:
@@ -182,8 +195,6 @@ class Foresight:
         else:
             members = done[-1].end
         for alone in asked[same:]:
-            if not wanted():
-                return None
             begin, members = members, [member.copy() for member in members]
             passes = not self._limits.keeps(members, alone)
             for member in members:  # the rest of the way, where it was left
