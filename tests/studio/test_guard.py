@@ -65,7 +65,7 @@ def status(ask):
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/stop", "/vent", "/notify", "/studio/stop.js", "/_nicegui/3.18.0/static/nicegui.js"]
+    "path", ["/", "/stop", "/vent", "/notify", "/sequence", "/studio/stop.js", "/_nicegui/3.18.0/static/nicegui.js"]
 )
 def test_without_the_token_nothing_is_answered(ask, status, path):
     sent = ask(path)

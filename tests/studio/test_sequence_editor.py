@@ -285,7 +285,7 @@ def test_two_pages_edit_the_same_and_none_undoes_the_other_unseen(studio, edit, 
     editor = studio.studio.desk.editor
     stale = {"kind": "place", "step": 1, "row": 0, "height": 12.0, "revision": editor.timeline.revision - 1}
     studio.loop.call_soon_threadsafe(editor.change, stale)
-    assert studio.until(lambda: "Another page" in editor.problem)
+    assert studio.until(lambda: "changed elsewhere" in editor.problem)
     assert edited(studio).each[1].targets_mm[0] == 8.0
     second.locator("[data-key='0-1']").focus()
     second.keyboard.press("PageUp")
@@ -335,7 +335,10 @@ def test_the_library_and_a_pattern_are_opened(studio, edit):
     page = edit(short(6.0))
     page.get_by_role("combobox", name="Of the library").select_option("ripple")
     page.get_by_role("button", name="Open it").click()
+    page.get_by_role("combobox", name="Rows").select_option("all")  # at once: the page does not know the ripple yet
     assert studio.until(lambda: edited(studio).name == "ripple")
+    keyframe(page, 0, 15).wait_for()
+    assert page.locator("[data-row]").count() == 1
     line = page.get_by_role("textbox", name="Of a pattern")
     line.fill("wave.slwo(2)")
     page.get_by_role("button", name="Make keyframes of it").click()

@@ -77,8 +77,8 @@ class Editor:
     def change(self, what: Message) -> None:
         """Do what a page asks; `problem` says why it could not be done."""
         timeline = self.timeline
-        if what.get("revision") != timeline.revision:
-            self.problem = "Another page has changed the sequence meanwhile; this is how it is now."
+        if what.get("kind") != "rows" and what.get("revision") != timeline.revision:
+            self.problem = "The sequence was changed elsewhere meanwhile; this is how it is now."
             self._tell()
             return
         self._try(lambda: timeline.change(what, self._owner.skin.layout if self._owner.skin else None))
