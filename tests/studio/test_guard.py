@@ -71,6 +71,7 @@ def status(ask):
         "/stop",
         "/vent",
         "/notify",
+        "/sequence",
         "/studio/stop.js",
         "/array/array.js",
         "/recordings/a.csv",

@@ -1,7 +1,7 @@
-"""How quick the studio is in a headless Chromium here: drawn updates a second, pointer to target; and docs/pictures/studio.png.
+"""How quick the studio is in a headless Chromium here: drawn updates a second, pointer to target; and the pictures of its page.
 
 python tools/report/studio.py               # measures; takes a minute
-python tools/report/studio.py --picture     # writes the picture too
+python tools/report/studio.py --picture     # writes the pictures too
 """
 
 import argparse
@@ -23,6 +23,7 @@ from bubbleskin.studio.server import Studio
 
 SECONDS = 5.0
 PICTURE = "docs/pictures/studio.png"
+EDITOR_PICTURE = "docs/pictures/studio_sequence.png"
 DOME_MM = 9.6, 3.6  # its middle, and how much lower the outer ring is: no two touch, and none is lifted
 
 
@@ -121,6 +122,26 @@ def picture(studio: Studio, context: BrowserContext, loop: asyncio.AbstractEvent
     print(f"wrote {PICTURE}")
 
 
+def editor_picture(studio: Studio, context: BrowserContext) -> None:
+    """A sequence whose order makes it higher than it was asked, in the sequence editor."""
+    page = context.new_page()
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(f"{studio.address}/?tab=sequence")
+    page.get_by_role("button", name="Vent").click()
+    page.get_by_role("combobox", name="Of the library").select_option("pop-up")
+    page.get_by_role("button", name="Open it").click()
+    page.get_by_role("combobox", name="Rows").select_option("rings")
+    page.locator(".timeline-says").wait_for()
+    page.locator("[data-key='0-0']").focus()
+    page.get_by_role("slider", name="Playhead").focus()
+    page.keyboard.press("End")
+    page.wait_for_timeout(2000)
+    page.evaluate("scrollTo(0, 0)")
+    page.screenshot(path=EDITOR_PICTURE)
+    page.close()
+    print(f"wrote {EDITOR_PICTURE}")
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--picture", action="store_true")
@@ -143,6 +164,7 @@ def main() -> None:
         print(f"pointer to target, 19 bubbles: median {median:.0f} ms, p95 {most:.0f} ms of {moves} targets")
         if chosen.picture:
             picture(studio, context, loop)
+            editor_picture(studio, context)
         for rings in (2, 3):
             page.goto(f"{studio.address}/many?rings={rings}")
             page.locator("[data-bubble='0'][aria-label]").wait_for()

@@ -56,6 +56,10 @@ class Array(Element, component=WEB / "array.js"):
             self.recorded = ""
             self.run_method("record", "", message(before[-1]) if before else None, [message(one) for one in before])
 
+    def foresee(self, tops_mm: list[float] | None) -> None:
+        """Show besides where the bubbles would stand, (n,); None: nothing besides."""
+        self.run_method("foresee", tops_mm)
+
     def _bubble(self, event: GenericEventArguments) -> None:
         if self.on_bubble:
             self.on_bubble(event.args)

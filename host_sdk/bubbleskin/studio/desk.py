@@ -16,6 +16,7 @@ from bubbleskin.files import is_image
 from bubbleskin.layout import Layout
 from bubbleskin.sequence.model import Sequence
 from bubbleskin.studio.assistant import Assistant
+from bubbleskin.studio.editor import Editor
 from bubbleskin.studio.owner import Owner
 from bubbleskin.studio.recorder import Recorder
 from bubbleskin.studio.widgets import Range
@@ -76,6 +77,8 @@ class Desk:
 
     def __post_init__(self) -> None:
         self.assistant = Assistant(self.owner)
+        self.editor = Editor(self.owner)
+        """The sequence that is edited."""
 
     @property
     def layout(self) -> Layout:

@@ -5,6 +5,7 @@ import contextlib
 import time
 from collections import deque
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from bubbleskin.device.health import Health
 from bubbleskin.device.state import State
 from bubbleskin.errors import BubbleskinError, InvalidInput, LinkError
 from bubbleskin.sequence.model import Playable
+from bubbleskin.sequence.playback import PlaybackStatus
 from bubbleskin.surface.shows import STREAM_S
 from bubbleskin.telemetry.fields import USUAL, most
 
@@ -74,7 +76,9 @@ class Owner:
         self.state: State | None = None
         self.health: Health | None = None
         self.activity = ""
-        """What plays: pulse, terrain, buttons, pattern; empty after stop and vent, which end it."""
+        """What plays: pulse, terrain, buttons, pattern, sequence; empty after stop and vent, which end it."""
+        self.played: PlaybackStatus | None = None
+        """How far the sequence is that plays, told at every step; of the last one where none does."""
         self.history: deque[State] = deque(maxlen=round(RATE_HZ * HISTORY_S))
         self.latencies: deque[float] = deque(maxlen=_LATENCIES)
         """Seconds from a pointer's move in the browser to the wristband's answer that its target is another."""
@@ -166,7 +170,7 @@ class Owner:
         if self.is_lent:
             raise InvalidInput(_LENT)
         self._forget()
-        self.activity = activity
+        self.activity, self.played = activity, None
         self._playing = asyncio.create_task(self._play(sequence))
 
     def begin(self, activity: str) -> None:
@@ -235,7 +239,7 @@ class Owner:
     async def _play(self, sequence: Playable) -> None:
         skin = self.skin
         if skin:
-            await self._say(skin.play(sequence))
+            await self._say(skin.play(sequence, progress=partial(setattr, self, "played")))
         self.activity = ""
         self._playing = None
 

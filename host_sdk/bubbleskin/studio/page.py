@@ -17,6 +17,7 @@ from bubbleskin.studio.panels.live import LivePanel, choose_device
 from bubbleskin.studio.panels.patterns import PatternPanel
 from bubbleskin.studio.panels.pulse import PulsePanel
 from bubbleskin.studio.panels.recorder import RecorderPanel
+from bubbleskin.studio.panels.sequence import SequencePanel
 from bubbleskin.studio.panels.terrain import TerrainPanel
 from bubbleskin.studio.widgets import text
 
@@ -37,6 +38,7 @@ PANELS: dict[str, tuple[str, Callable[[Desk, Array], Panel]]] = {
     "terrain": ("Terrain", TerrainPanel),
     "buttons": ("Buttons", ButtonsPanel),
     "patterns": ("Patterns", PatternPanel),
+    "sequence": ("Sequence", SequencePanel),
     "recorder": ("Recorder", RecorderPanel),
     "calibration": ("Calibration", CalibrationPanel),
 }
@@ -97,6 +99,8 @@ class Page:
         if self._array:
             self._array.on_bubble = self._array.on_choose = None
             self._array.show_now(self._history())
+            if self._client.has_socket_connection:
+                self._array.foresee(None)
         with self._place:
             if self._array:
                 self._panel = PANELS[name][1](self._desk, self._array)

@@ -19,7 +19,7 @@ from nicegui.client import Client
 from starlette.staticfiles import StaticFiles
 
 from bubbleskin.browser.messages import WEB
-from bubbleskin.errors import InvalidInput
+from bubbleskin.errors import BubbleskinError, InvalidInput
 from bubbleskin.studio.desk import Desk
 from bubbleskin.studio.files import STATIC
 from bubbleskin.studio.guard import Guard
@@ -134,6 +134,22 @@ class Studio:
         @app.post("/terrain")
         async def terrain(request: Request, name: str = "") -> JSONResponse:
             return _answer(await desk.upload(name, await request.body()))
+
+        @app.post("/sequence")
+        async def upload(request: Request, name: str = "") -> JSONResponse:
+            return _answer(await desk.editor.upload(name, await request.body()))
+
+        @app.get("/sequence")
+        async def save() -> Response:
+            try:
+                name, written = desk.editor.saved()
+            except BubbleskinError as error:
+                return _answer(str(error))
+            return Response(
+                written,
+                media_type="application/json",
+                headers={"Content-Disposition": f'attachment; filename="{name}"'},
+            )
 
         @ui.page("/", title="bubbleskin studio")
         def page(tab: str = "live") -> None:

@@ -26,9 +26,9 @@ FOLLOWED = 5000
 """Steps that are followed at most; a sequence without end has come back to its beginning long before."""
 _TIMES = 2
 """Times that all of it is followed: the second begins where the first ended."""
-_MANY = 200
+MANY = 200
 """Of more steps only the likeliest wristband is followed."""
-_OTHERS = (2, 4)
+OTHERS = (2, 4)
 """Those of the others in which bubbles are lifted most: softer necks."""
 _FINEST_MM = 0.1
 
@@ -86,8 +86,8 @@ def _stays_below(steps: list[Array], height_mm: float, kept: KeptShape, limits: 
 def _followed(kept: KeptShape, steps: int) -> "Iterator[HeldShape]":
     members = kept.begun()
     yield members[0]
-    if steps <= _MANY:
-        yield from (members[number] for number in _OTHERS)
+    if steps <= MANY:
+        yield from (members[number] for number in OTHERS)
 
 
 def _length(parts: Items[Step | Repeat]) -> int:

@@ -146,6 +146,11 @@ export default {
     history(messages) {
       this.past = messages;
     },
+    foresee(tops) {
+      // Where bubbles would stand; a wristband's own shape is drawn as before.
+      this.foreseen = tops && tops.length === this.positions.length ? tops : null;
+      this.draw();
+    },
 
     // The camera.
 
@@ -209,7 +214,7 @@ export default {
     buildBubble(bubble) {
       const group = make(this.layer, "g", { class: "bubble", role: "button", tabindex: bubble === this.chosen ? 0 : -1, "data-bubble": bubble });
       const parts = { group, foot: make(this.plate, "ellipse") };
-      for (const part of ["doubt", "ghost", "ball", "light"]) parts[part] = make(group, "circle", { class: part });
+      for (const part of ["doubt", "ghost", "ball", "light", "foreseen"]) parts[part] = make(group, "circle", { class: part });
       parts.light.setAttribute("fill", `url(#${this.shade})`);
       parts.label = make(this.labels, "text");
       parts.name = make(parts.label, "tspan", { class: "number" });
@@ -256,6 +261,10 @@ export default {
       const [gx, gy] = this.place(x, y, now.g[bubble] / 2);
       circle(parts.ghost, gx, gy, now.g[bubble] / 2);
       circle(parts.doubt, cx, cy, across / 2 + (now.sd ? now.sd[bubble] : 0));
+      const would = this.foreseen ? this.foreseen[bubble] : 0;
+      circle(parts.foreseen, ...this.place(x, y, would / 2).slice(0, 2), would / 2);
+      if (this.foreseen) parts.group.dataset.foreseen = would;
+      else delete parts.group.dataset.foreseen;
       const [ux, uy] = this.place(x, y, 0);
       for (const [name, value] of Object.entries({ cx: ux, cy: uy, rx: 0.6 * this.pitch, ry: 0.6 * this.pitch * Math.sin((this.elevation * Math.PI) / 180) }))
         parts.foot.setAttribute(name, value.toFixed(2));
