@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from bubble_firmware.app import App
 from bubble_firmware.hal.base import Hal
+from bubble_protocol.schema.faults import ESTOP
+from bubbleskin.errors import InvalidInput
 from bubbleskin.sim import jit
 from bubbleskin.sim.flash import NorFlash
 
@@ -33,6 +35,15 @@ class Firmware(ABC):
     @abstractmethod
     def listen(self, link: bytes, phase_us: int) -> Outputs:
         """Bytes of the link, `phase_us` µs after a period has begun."""
+
+    def open_loop(self, is_open: bool) -> None:
+        """The loop through the emergency stop is open from now on, as when the button is pressed, or closed.
+
+        As it stands here, `InvalidInput`: in lockstep with another process there are no pins.
+        """
+        raise InvalidInput(
+            "What runs the firmware here has no pin for an emergency stop: it cannot be pressed or wired. Use sim:// or rp2040://."
+        )
 
     @abstractmethod
     def reset(self) -> None:
@@ -73,6 +84,10 @@ class InProcessFirmware(Firmware, Hal):
         if self._restarting:
             self.reset()
         return Outputs(self._pulses, self._pump, self._dump, bytes(self._out))
+
+    def open_loop(self, is_open: bool) -> None:
+        """See `Firmware`."""
+        self.active_faults = self.active_faults | ESTOP if is_open else self.active_faults & ~ESTOP
 
     def reset(self) -> None:
         """See `Firmware`."""

@@ -6,7 +6,9 @@ from typing import cast
 
 from bubbleskin import checks
 from bubbleskin.errors import InvalidInput
+from bubbleskin.sim import wiring
 from bubbleskin.sim.recipe import NUMBERS, PlantOptions
+from bubbleskin.sim.wiring import Wiring
 
 _REAL = ("spread", "loss", *NUMBERS)
 _TEXTS = ("rubber", "sheet", "plant")
@@ -27,15 +29,22 @@ class Options:
     """The file that keeps its flash."""
     plant: PlantOptions = field(default_factory=PlantOptions)
     """What else the plant is asked to be."""
+    wiring: Wiring = field(default_factory=Wiring)
+    """What is wired wrongly."""
 
     @classmethod
     def parse(cls, options: dict[str, str], url: str) -> "Options":
         """From the query of `url`; `InvalidInput` for an option that is not known or not a number."""
-        known = [field.name for field in fields(cls) if field.name != "plant"] + [*_TEXTS, *NUMBERS]
+        known = [field.name for field in fields(cls) if field.name not in ("plant", "wiring")]
+        known += [*_TEXTS, *NUMBERS, *wiring.NAMES]
         for name in options:
             if name not in known:
                 raise InvalidInput(f"{url} has the option {name!r}; known are {', '.join(known)}.")
-        values = {name: _number(name, text, url) for name, text in options.items() if name not in ("store", *_TEXTS)}
+        values = {
+            name: _number(name, text, url)
+            for name, text in options.items()
+            if name not in ("store", *_TEXTS, *wiring.NAMES)
+        }
         plant = {name: options[name] for name in _TEXTS if name in options}
         return cls(
             seed=int(values.get("seed", 0)),
@@ -44,6 +53,7 @@ class Options:
             loss=values.get("loss", 0.0),
             contact=bool(values.get("contact", True)),
             store=_file(options["store"], url) if "store" in options else None,
+            wiring=Wiring.parse({name: options[name] for name in wiring.NAMES if name in options}),
             plant=cast(PlantOptions, plant | {name: values[name] for name in NUMBERS if name in values}),
         )
 

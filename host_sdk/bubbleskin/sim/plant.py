@@ -189,6 +189,7 @@ class Plant:
 
         Of the reservoir, whatever the `bubble`: `supply_stuck`, `supply_bias`, `supply_absent` the same of its sensor;
         `supply_flat`: Pa that this says, with noise, whatever the pressure; `relief_stuck`: 1 for a relief valve that stays shut.
+        `pump_off`: 1 for a pump that brings nothing. `dump_stuck`: 1 for a dump valve stuck open, -1 stuck closed.
         """
         if fault in records.SUPPLY_FAILURES:
             self._air[fault] = value

@@ -75,7 +75,14 @@ def _start(scheme: str, name: str, chosen: Options) -> Simulated:
     if scheme == "rp2040":
         from bubbleskin.sim.rp2040 import open_chip
 
-        return open_chip(name, seed=chosen.seed, spread=chosen.spread, contact=chosen.contact, **chosen.plant)
+        return open_chip(
+            name,
+            seed=chosen.seed,
+            spread=chosen.spread,
+            contact=chosen.contact,
+            wiring=chosen.wiring,
+            **chosen.plant,
+        )
     firmware = None
     if scheme == "micropython":
         from bubbleskin.sim.micropython import MicroPythonFirmware
@@ -90,6 +97,7 @@ def _start(scheme: str, name: str, chosen: Options) -> Simulated:
             contact=chosen.contact,
             firmware=firmware,
             flash=flash,
+            wiring=chosen.wiring,
             **chosen.plant,
         )
     except BaseException:
