@@ -4,6 +4,10 @@ TYPE_CHECKING = False  # as of `typing`, which is not waited for
 if TYPE_CHECKING:
     from bubbleskin import patterns as patterns
     from bubbleskin.async_skin import AsyncSkin
+    from bubbleskin.bringup.findings import Finding
+    from bubbleskin.bringup.questions import Question
+    from bubbleskin.bringup.report import BringUp
+    from bubbleskin.bringup.session import bring_up
     from bubbleskin.calibrate.measure import CalibrationProgress
     from bubbleskin.calibrate.result import BubbleCalibration, SelfCalibration
     from bubbleskin.connecting import aconnect, connect
@@ -59,6 +63,7 @@ if TYPE_CHECKING:
 _ROOMS = {
     "After": "sequence.steps",
     "AsyncSkin": "async_skin",
+    "BringUp": "bringup.report",
     "BubbleCalibration": "calibrate.result",
     "BubbleskinError": "errors",
     "Calibration": "membrane",
@@ -70,6 +75,7 @@ _ROOMS = {
     "DeviceRestarted": "errors",
     "DeviceSilent": "errors",
     "Fault": "device.faults",
+    "Finding": "bringup.findings",
     "Health": "device.health",
     "Info": "device.info",
     "InvalidInput": "errors",
@@ -83,6 +89,7 @@ _ROOMS = {
     "PlaybackStatus": "sequence.playback",
     "Recording": "telemetry.recording",
     "Repeat": "sequence.steps",
+    "Question": "bringup.questions",
     "RigidContact": "contact.rigid",
     "SelfCalibration": "calibrate.result",
     "Sequence": "sequence.model",
@@ -100,6 +107,7 @@ _ROOMS = {
     "YeohBalloon": "membrane",
     "YeohFit": "membrane",
     "aconnect": "connecting",
+    "bring_up": "bringup.session",
     "build_table": "membrane",
     "connect": "connecting",
     "fit_contact": "contact.fit",
@@ -115,6 +123,7 @@ _MODULES = {"patterns": "patterns", "sequences": "sequence.library", "shapes": "
 __all__ = [
     "After",
     "AsyncSkin",
+    "BringUp",
     "BubbleCalibration",
     "BubbleskinError",
     "Calibration",
@@ -126,6 +135,7 @@ __all__ = [
     "DeviceRestarted",
     "DeviceSilent",
     "Fault",
+    "Finding",
     "Health",
     "Info",
     "InvalidInput",
@@ -137,6 +147,7 @@ __all__ = [
     "Plan",
     "PlaybackReport",
     "PlaybackStatus",
+    "Question",
     "Recording",
     "Repeat",
     "RigidContact",
@@ -156,6 +167,7 @@ __all__ = [
     "YeohBalloon",
     "YeohFit",
     "aconnect",
+    "bring_up",
     "build_table",
     "connect",
     "fit_contact",

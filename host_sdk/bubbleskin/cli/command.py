@@ -11,6 +11,7 @@ import click
 
 from bubbleskin.cli import (
     bench,
+    bring_up,
     calibrate,
     demonstrations,
     device,
@@ -55,6 +56,7 @@ for _command in (
     *membrane.commands,
     *fit_contact.commands,
     *calibrate.commands,
+    *bring_up.commands,
     *plot.commands,
     *bench.commands,
     *firmware.commands,
