@@ -215,7 +215,7 @@ def _moved(group: Sequence[int], plugs: dict[str, Lead], tubes: dict[int, int], 
                 "tubes_swapped",
                 tuple(f"tube {i}" for i in moved),
                 f"The tubes {_list(moved)} lead to each other's bubbles.",
-                f"Put the tubes right: {_way({i: tubes[i] for i in moved}, 'place', 'leads to bubble')}.",
+                f"Exchange them: now {_way({i: tubes[i] for i in moved}, 'place', 'leads to bubble')}.",
                 f"A pulse of one was not gone while its own bubble was off, but while the other's was.{also}",
             )
         )
@@ -242,7 +242,7 @@ def _plugs(kind: str, to: dict[int, int], also: str) -> Finding:
         f"The wires of the {many} {_list(to)} are swapped."
         if kind != "sensor"
         else f"The {many} {_list(to)} are swapped.",
-        f"Exchange their plugs: {_way(to, 'input' if kind == 'sensor' else 'output', verb)}.",
+        f"Exchange their plugs: now {_way(to, 'input' if kind == 'sensor' else 'output', verb)}.",
         seen + also,
     )
 
