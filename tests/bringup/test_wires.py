@@ -126,6 +126,7 @@ one_swap = st.one_of(
 )
 
 
+@pytest.mark.medium
 @given(one_swap)
 def test_one_mistake_is_named(wiring):
     assert alike(told(diagnose(wiring)), wiring)
@@ -145,6 +146,7 @@ def parts(wiring: Wiring) -> set[int]:
 apart = st.tuples(one_swap, one_swap).filter(lambda two: not parts(two[0]) & parts(two[1]))
 
 
+@pytest.mark.medium
 @given(apart)
 def test_two_mistakes_of_different_places_are_named(mistakes):
     wiring = both(*mistakes)
@@ -154,6 +156,7 @@ def test_two_mistakes_of_different_places_are_named(mistakes):
 plugs = st.sampled_from(["tubes", "sensors", "fill", "vent"])
 
 
+@pytest.mark.medium
 @given(two, st.lists(plugs, min_size=2, max_size=3, unique=True))
 def test_several_swaps_of_the_same_two_places_are_named_or_what_does_the_same(pair, kinds):
     i, j = pair

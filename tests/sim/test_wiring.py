@@ -32,6 +32,7 @@ wirings = st.builds(
 )
 
 
+@pytest.mark.medium
 @given(wirings)
 def test_a_plants_file_keeps_the_wiring(tmp_path_factory, wiring):
     path = tmp_path_factory.mktemp("plant") / "wired.toml"
@@ -40,6 +41,7 @@ def test_a_plants_file_keeps_the_wiring(tmp_path_factory, wiring):
     plant_file.read(path, N)
 
 
+@pytest.mark.medium
 @given(wirings)
 def test_every_output_drives_one_valve_at_most_and_every_input_reads_one_line(wiring):
     coils = wiring.checked(N).coils(N)
@@ -48,6 +50,18 @@ def test_every_output_drives_one_valve_at_most_and_every_input_reads_one_line(wi
     assert sorted(wiring.channels(N)) == list(range(N))
 
 
+def test_what_each_part_does():
+    straight = Wiring()
+    assert straight.coils(3).tolist() == [0, 1, 2, 3, 4, 5]
+    assert Wiring(tubes=((0, 2),)).coils(3).tolist() == [4, 5, 2, 3, 0, 1]
+    assert Wiring(tubes=((0, 2),)).channels(3).tolist() == [2, 1, 0]
+    assert Wiring(sensors=((0, 2),)).coils(3).tolist() == straight.coils(3).tolist()
+    assert Wiring(sensors=((0, 2),)).channels(3).tolist() == [2, 1, 0]
+    assert Wiring(valves=(("fill0", "vent2"),)).coils(3).tolist() == [5, 1, 2, 3, 4, 0]
+    assert Wiring(dead=("vent1",), tubes=((0, 1),)).coils(3).tolist() == [2, 3, 0, -1, 4, 5]
+
+
+@pytest.mark.medium
 @given(wirings.filter(lambda wiring: not wiring.valves and not wiring.dead))
 def test_two_tubes_exchanged_are_a_place_that_leads_elsewhere(wiring):
     """Valves and sensor of a place go with its tube: sensors of their own apart, they all lead to the same bubble."""
@@ -90,6 +104,7 @@ def test_a_file_that_says_it_otherwise_is_refused(tmp_path, wiring):
         bs.connect(f"sim://wristband7?plant={path}")
 
 
+@pytest.mark.medium
 @given(wirings.filter(lambda wiring: not wiring.dead), st.integers(0, 2**32 - 1))
 def test_nothing_but_places_changes(wiring, seed):
     """With wires that cross no kinds, a wired plant is the straight one, with its pulses sent elsewhere."""

@@ -13,8 +13,10 @@ from bubble_firmware.hal.lockstep import LINK_IN
 from bubbleskin import boards, checks
 from bubbleskin.errors import InvalidInput
 from bubbleskin.sim import plant_file
+from bubbleskin.sim.failures import Failures
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
+from bubbleskin.sim.impairment import Impairment
 from bubbleskin.sim.recipe import PlantOptions, make_plant
 from bubbleskin.sim.wiring import Wires, Wiring
 
@@ -48,6 +50,9 @@ class Simulated(ABC):
         self.plant = make_plant(self.data, seed, spread, contact, **options)
         self.wiring = _wiring(wiring, options.get("plant"), self.data.BUBBLES)
         """What of it is wired wrongly."""
+        self.line: Impairment | None = None
+        """How its line is impaired, where that was injected."""
+        self._failures = Failures(self)
         self.to_device = bytearray()
         """Bytes of the link that the firmware has not read yet."""
         self.from_device = bytearray()
@@ -100,9 +105,22 @@ class Simulated(ABC):
     def listen(self, phase_us: int) -> None:
         """Let the firmware answer what has come over the link, `phase_us` µs after the last tick; no time passes."""
 
+    def inject(self, fault: str, number: int = 0, value: str | float = 1.0) -> None:
+        """Make a part fail: `inject("sensor", 3, "stuck")`, by the words of `bubbleskin.sim.failures`; "healthy" mends it.
+
+        Or one of `Plant.inject`, with a number for its value: `inject("leak", 3, 5e-8)`; 0 mends it. Or `inject("estop")`, which
+        presses the emergency stop. `number` is the bubble's. Raises `InvalidInput`.
+        """
+        number = checks.whole("The number of the bubble", number, 0, self.data.BUBBLES - 1)
+        checks.text("fault", fault)
+        if isinstance(value, str):
+            self._failures.inject(fault, number, value)
+        else:
+            self._inject(fault, number, checks.number("value", value))
+
     @abstractmethod
-    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
-        """Make something fail, as of `Plant.inject`: `number` is the bubble's; or `estop`, press it. A value of 0 mends it."""
+    def _inject(self, fault: str, number: int, value: float) -> None:
+        """Make something fail that has a value."""
 
     def _loop_is_open(self, pressed: bool) -> bool:
         """Whether the loop through the emergency stop is open, by its contact."""
@@ -221,14 +239,8 @@ class SimulatedBoard(Simulated):
         self._pulses[:] = 0.0, self.tick_s
         self._pump, self._dump, self._decided = 0.0, False, None
 
-    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
-        """Make bubble `number` fail, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 mends it.
-
-        `estop`: the emergency stop is pressed, which opens its loop and takes the valves' and the pump's current away.
-        """
-        number = checks.whole("The number of the bubble", number, 0, self.data.BUBBLES - 1)
-        value = checks.number("value", value)
-        if checks.text("fault", fault) == "estop":
+    def _inject(self, fault: str, number: int, value: float) -> None:
+        if fault == "estop":
             self.firmware.open_loop(self._loop_is_open(value != 0))
             self._pressed = value != 0
         else:

@@ -6,7 +6,7 @@ from typing import cast
 
 from bubbleskin import checks
 from bubbleskin.errors import InvalidInput
-from bubbleskin.sim import wiring
+from bubbleskin.sim import failures, wiring
 from bubbleskin.sim.recipe import NUMBERS, PlantOptions
 from bubbleskin.sim.wiring import Wiring
 
@@ -29,6 +29,8 @@ class Options:
     """The file that keeps its flash."""
     plant: PlantOptions = field(default_factory=PlantOptions)
     """What else the plant is asked to be."""
+    fail: tuple[tuple[str, int, str], ...] = ()
+    """What fails from the start: part, number, and how, as of `bubbleskin.sim.failures`."""
     wiring: Wiring = field(default_factory=Wiring)
     """What is wired wrongly."""
 
@@ -43,7 +45,7 @@ class Options:
         values = {
             name: _number(name, text, url)
             for name, text in options.items()
-            if name not in ("store", *_TEXTS, *wiring.NAMES)
+            if name not in ("store", "fail", *_TEXTS, *wiring.NAMES)
         }
         plant = {name: options[name] for name in _TEXTS if name in options}
         return cls(
@@ -53,6 +55,7 @@ class Options:
             loss=values.get("loss", 0.0),
             contact=bool(values.get("contact", True)),
             store=_file(options["store"], url) if "store" in options else None,
+            fail=_failures(options["fail"]) if "fail" in options else (),
             wiring=Wiring.parse({name: options[name] for name in wiring.NAMES if name in options}),
             plant=cast(PlantOptions, plant | {name: values[name] for name in NUMBERS if name in values}),
         )
@@ -64,6 +67,24 @@ def _number(name: str, text: str, url: str) -> float:
     if name in _REAL:
         return number  # its range is the board's to say
     return checks.whole(shown, number, 0, checks.SEED_MAX if name == "seed" else 1)
+
+
+def _failures(text: str) -> tuple[tuple[str, int, str], ...]:
+    """`sensor3-stuck,pump-off`: the part, the bubble's number where it has one, a dash, and how."""
+    found = []
+    for said in text.split(","):
+        part, _, how = said.rpartition("-")
+        word = part.rstrip("0123456789")
+        number = part[len(word) :]
+        if not word:
+            raise InvalidInput(
+                f"fail has {said!r}; give part, number and how it fails, such as fail=sensor3-stuck,pump-off."
+            )
+        failures.failure_of(failures.part_of(word), how)
+        if failures.part_of(word) in failures.OF_BUBBLES and not number:
+            raise InvalidInput(f"fail has {said!r}; say of which bubble, such as fail={word}3-{how}.")
+        found.append((word, int(number or 0), how))
+    return tuple(found)
 
 
 def _file(name: str, url: str) -> Path:

@@ -175,7 +175,7 @@ class Rp2040Board(Simulated):
     def listen(self, phase_us: int) -> None:
         """Nothing: the chip looks at its link when it likes."""
 
-    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
+    def _inject(self, fault: str, number: int, value: float) -> None:
         """Make something fail, as of `Plant.inject` or one of `FAILURES`; a value of 0 mends it.
 
         `converter_silent`, `driver_silent`: chip `number` answers no more. `supply_lost`: the pump stands still
