@@ -84,11 +84,12 @@ def test_whatever_it_changes_in_the_plant_is_as_before_once_it_is_healthy(failur
     before = now()
     board.inject(failure.part, 2, failure.how)
     board.step(0.0)
-    assert now() != before or bool(plant.live) or board.line is not None
+    assert now() != before or bool(plant.live) or board.line is not None or board.clock_pace != 1.0
     board.inject(failure.part, 2, "healthy")
     assert now() == before
     assert not plant.live
     assert board.line is None
+    assert board.clock_pace == 1.0
 
 
 def test_another_failure_of_the_same_part_takes_the_first_ones_place():
@@ -156,9 +157,31 @@ def test_a_line_that_fails_takes_longer_and_can_be_mended(how):
         assert skin.simulated.time - before < 0.6
 
 
+@pytest.mark.medium
+def test_a_slow_crystal_is_what_the_clock_finds():
+    with bs.connect("sim://wristband7?fail=clock-slow") as skin:
+        skin.sleep(60.0)
+        assert skin.clock.drift_ppm == pytest.approx(-60.0, abs=15.0)
+
+
+def test_a_clock_that_is_wrong_goes_slow_by_the_hosts():
+    with bs.connect("sim://wristband7") as skin:
+        skin.sleep(1.0)
+        skin.inject("clock", 0, "wrong")
+        begin, device = skin.link.transport.now(), skin.state().time
+        skin.sleep(5.1)
+        assert skin.link.transport.now() - begin == pytest.approx(5.1, abs=0.03)
+        assert skin.state().time - device == pytest.approx(5.0, abs=0.03)
+        skin.inject("clock", 0, "healthy")
+        begin, device = skin.link.transport.now(), skin.state().time
+        skin.sleep(5.0)
+        assert skin.state().time - device == pytest.approx(5.0, abs=0.03)
+        assert skin.link.transport.now() - begin == pytest.approx(5.0, abs=0.03), "the host's does not leap back"
+
+
 def test_every_part_and_every_how_of_the_vocabulary_is_there():
     assert {failure.how for failure in TABLE} == set(HOWS)
-    assert {failure.part for failure in TABLE} == set(PARTS) - {"clock"}
+    assert {failure.part for failure in TABLE} == set(PARTS)
     assert len({(failure.part, failure.how) for failure in TABLE}) == len(TABLE)
     for failure in TABLE:
         assert failure.plant.keys() <= {*FAILURES, *SUPPLY_FAILURES}
@@ -171,7 +194,7 @@ def test_every_part_and_every_how_of_the_vocabulary_is_there():
         (("sensor", 3, "hot"), "it can be off, stuck, wrong"),
         (("tube", 3, "wrong"), "tubes=1-4"),
         (("valve", 3, "stuck"), "give one of sensor, fill valve"),
-        (("clock", 0, "slow"), "cannot be made to fail"),
+        (("clock", 0, "off"), "it can be slow, wrong, and healthy again"),
         (("sensor", 7, "stuck"), "0 to 6"),
         (("sensor", "three", "stuck"), "number"),
         (("sensor", 3, 5), "text"),
@@ -254,7 +277,7 @@ def test_the_command_lists_them(command):
 
 
 @pytest.mark.parametrize(
-    "words", [[], ["sensor"], ["sensor", "stuck"], ["sensor", "2", "hot"], ["clock", "slow"], ["x", "y"]]
+    "words", [[], ["sensor"], ["sensor", "stuck"], ["sensor", "2", "hot"], ["clock", "off"], ["x", "y"]]
 )
 def test_the_command_refuses_in_a_sentence(command, words):
     status, out, err = command("inject", *words)

@@ -52,6 +52,8 @@ class Simulated(ABC):
         """What of it is wired wrongly."""
         self.line: Impairment | None = None
         """How its line is impaired, where that was injected."""
+        self.clock_pace = 1.0
+        """Seconds of the host's clock in one of the device's, where that was injected."""
         self._failures = Failures(self)
         self.to_device = bytearray()
         """Bytes of the link that the firmware has not read yet."""

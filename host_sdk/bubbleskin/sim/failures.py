@@ -39,6 +39,8 @@ class Failure:
     """How the sensor is late: "lag" or "delay"."""
     line: Impairment | None = None
     """What the line does."""
+    pace: float = 1.0
+    """Seconds of the host's clock in one of the device's."""
 
 
 _BLINK = (0.02, 0.2)
@@ -112,6 +114,8 @@ TABLE = (
     Failure("link", "delayed", "half of what comes is 30 ms late, and again", line=Impairment(stall=0.5, stall_s=0.03)),
     Failure("link", "intermittent", "now and then nothing comes for 0.3 s", line=Impairment(stall=0.02, stall_s=0.3)),
     Failure("link", "missing", "as off: loses everything", line=Impairment(drop=1.0)),
+    Failure("clock", "slow", "the device's crystal is 60 ppm slow, as far as good ones are off", pace=1.0 + 60e-6),
+    Failure("clock", "wrong", "the device's clock goes 2 % slow: no crystal does", pace=1.02),
 )
 _BY_WORDS = {(failure.part, failure.how): failure for failure in TABLE}
 _STUCK = {"sensor_stuck": "sensor", "supply_stuck": "supply"}
@@ -141,18 +145,10 @@ def hows(part: str) -> list[str]:
 
 def _refuse(part: str, how: object) -> NoReturn:
     can = hows(part)
-    if not can:
-        raise InvalidInput(
-            f"A {part} cannot be made to fail on a simulated board yet; what can is {_those_that_can()}."
-        )
     hint = (
         " Tubes that lead elsewhere are an option of the board, tubes=1-4." if (part, how) == ("tube", "wrong") else ""
     )
     raise InvalidInput(f"A {part} cannot be {shown(how)}; it can be {', '.join(can)}, and {HEALTHY} again.{hint}")
-
-
-def _those_that_can() -> str:
-    return ", ".join(part for part in PARTS if hows(part))
 
 
 class Failing(Protocol):
@@ -160,6 +156,7 @@ class Failing(Protocol):
 
     plant: "Plant"
     line: Impairment | None
+    clock_pace: float
 
 
 class Failures:
@@ -195,6 +192,7 @@ class Failures:
             plant.live.late(number, LATE_S, failure.sensor == "lag")
         if failure.line:
             self._board.line = failure.line
+        self._board.clock_pace *= failure.pace
 
     def _mend(self, failure: Failure, number: int) -> None:
         plant = self._board.plant
@@ -205,3 +203,5 @@ class Failures:
             plant.change(name, number, 1.0)
         if failure.line:
             self._board.line = None
+        if failure.pace != 1.0:
+            self._board.clock_pace = 1.0

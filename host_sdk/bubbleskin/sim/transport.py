@@ -19,6 +19,7 @@ class SimulatedTransport(Transport):
         self.blocks = realtime
         self._lossy: tuple[Impairment, LossyTransport] | None = None
         self._pace = Pace(board) if realtime else None
+        self._clock = 0.0, 0.0, 1.0  # since when the device's clock goes as it does: its time, the host's, and the pace
         self._closed = False
 
     def read(self, timeout: float) -> bytes:
@@ -45,7 +46,7 @@ class SimulatedTransport(Transport):
         """`read` on a line without failures."""
         self._check()
         board = self.board
-        until = board.time + timeout
+        until = board.time + timeout / board.clock_pace
         while not board.from_device and board.time < until:
             if self._pace:
                 self._pace.wait()
@@ -60,8 +61,12 @@ class SimulatedTransport(Transport):
         self.board.to_device += data
 
     def now(self) -> float:
-        """Virtual seconds since the board's start."""
-        return self.board.time
+        """Virtual seconds since the board's start, by a host's clock: the device's own, but where that was made to fail."""
+        board, (at, host, pace) = self.board, self._clock
+        now = host + (board.time - at) * pace
+        if board.clock_pace != pace:
+            self._clock = board.time, now, board.clock_pace
+        return now
 
     @property
     def behind(self) -> float:
