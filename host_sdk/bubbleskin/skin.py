@@ -251,7 +251,7 @@ class Skin(Pictured):
     def inject(self, part: str, number: int, how: str) -> None:
         """Make a part of a simulated board fail: `inject("sensor", 3, "stuck")`; "healthy" mends it.
 
-        Parts: sensor, fill valve, vent valve, tube, bubble, by the bubble's `number`; supply, pump, link, clock, of which there is one
+        Parts: sensor, fill valve, vent valve, tube, bubble, by the bubble's `number`; supply, pump, link, clock, which have none
         (0). Hows: off, stuck, wrong, noisy, slow, delayed, intermittent, missing; docs/simulator.md says which part can be what.
         Raises `InvalidInput` for others, and on a real board.
         """
