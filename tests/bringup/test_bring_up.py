@@ -185,6 +185,18 @@ def test_what_was_seen_is_asked_when_the_bubble_is_down_again(monkeypatch):
     assert max(pressure for _, pressure in seen) < 500.0
 
 
+@pytest.mark.parametrize("line", ["loss=0.01", "fail=link-delayed"])
+def test_a_bad_line_changes_nothing_of_what_is_said(line):
+    found = bring_up(f"tubes=1-4&seed=3&{line}")
+    assert [finding.name for finding in found.findings] == ["tubes_swapped"]
+
+
+def test_a_line_that_loses_too_much_is_said_instead_of_a_guess():
+    found = bring_up("seed=3&loss=0.2")
+    assert not found.findings
+    assert "bubbleskin doctor --link" in found.ended
+
+
 def test_a_no_at_the_first_question_moves_nothing():
     with bs.connect("sim://wristband7") as skin:
         before = skin.simulated.plant.air.copy()

@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bubbleskin.bringup.evidence import Pulse, Reservoir, Rest, Trace, read_pulse
-from bubbleskin.errors import DeviceRefused, LinkError
+from bubbleskin.errors import BubbleskinError, DeviceRefused, LinkError
 
 if TYPE_CHECKING:
+    from bubbleskin.device.state import State
     from bubbleskin.skin import Skin
 
 _FIELDS = ("pressure", "fill", "vent", "faults")
 _BEFORE_S, _PULSE_S, _AFTER_S = 0.05, 0.07, 0.5
 _FLAT_KPA, _FLAT_S = 0.4, 1.5
 _REST_S = 1.0
+_TRIES = 6
 OPEN_SHARE, SHUT_SHARE = 0.08, 0.02
 """Heights of a pulse, as shares of the way from rest to the greatest: into an open line, where it must last for a whole period
 to be seen, and into one that is shut, where 4 kPa are enough."""
@@ -86,29 +88,51 @@ class Board:
 
     def pulse(self, asked: tuple[int, ...], off: int | None) -> Pulse:
         """Let these bubbles rise a little for less than a tenth of a second, then vent."""
-        height = self.height_mm(SHUT_SHARE if off is None else OPEN_SHARE)
-        try:
-            return read_pulse(self._trace(self.heights(asked, height)), asked, off)
-        finally:
-            self.skin.vent()
-            self.flatten()
+        heights = self.heights(asked, self.height_mm(SHUT_SHARE if off is None else OPEN_SHARE))
+        for _ in range(_TRIES):
+            try:
+                trace = self._trace(heights)
+            finally:
+                self.skin.vent()
+                self.flatten()
+            if trace:
+                return read_pulse(trace, asked, off)
+        raise BubbleskinError(
+            f"Telemetry had gaps in {_TRIES} pulses, which tell nothing so; try the line with `bubbleskin doctor --link 5`."
+        )
 
-    def _trace(self, heights_mm: Sequence[float]) -> Trace:
-        skin, tick = self.skin, self.skin.info.tick
-        states = []
-        before, shown = round(_BEFORE_S / tick), round((_BEFORE_S + max(_PULSE_S, 9 * tick)) / tick)
-        after = shown + round(_AFTER_S / tick)
-        with closing(skin.telemetry(1.0 / tick, _FIELDS)) as telemetry:  # type: ignore[type-var]
+    def _trace(self, heights_mm: Sequence[float]) -> Trace | None:
+        """Telemetry around a pulse; None where some of it is missing, or the wristband did not follow."""
+        tick = self.skin.info.tick
+        states = self._watched(heights_mm, max(round(_PULSE_S / tick), 9), round(_AFTER_S / tick))
+        times = np.array([state.time for state in states])
+        active = np.flatnonzero([state.mode == "active" for state in states])
+        if not len(active):
+            return None
+        shown, vented = int(active[0]), int(active[-1]) + 1
+        if np.any(np.abs(np.diff(times[shown - 2 : vented + 1]) - tick) > 0.5 * tick):
+            return None
+        pressure = np.array([one.pressure_kpa for one in states]) - self.zero_kpa
+        fill, vent = (np.array([getattr(one, name) for one in states]) for name in ("fill_ms", "vent_ms"))
+        return Trace(pressure, fill, vent, shown, vented, tick)
+
+    def _watched(self, heights_mm: Sequence[float], rows: int, after: int) -> "list[State]":
+        """States before, during and after a SHOW of `rows` periods, by what the wristband says itself: lines may be slow."""
+        skin, before = self.skin, round(_BEFORE_S / self.skin.info.tick)
+        states: list[State] = []
+        active = left = 0
+        with closing(skin.telemetry(1.0 / skin.info.tick, _FIELDS)) as telemetry:  # type: ignore[type-var]
             for state in telemetry:
                 states.append(state)
+                active += state.mode == "active"
                 if len(states) == before:
                     skin.show(heights_mm, wait=False, plan=False)
-                elif len(states) == shown:
+                elif active == rows and state.mode == "active":
                     skin.vent()
-                elif len(states) > after:
-                    pressure = np.array([one.pressure_kpa for one in states]) - self.zero_kpa
-                    fill, vent = (np.array([getattr(one, name) for one in states]) for name in ("fill_ms", "vent_ms"))
-                    return Trace(pressure, fill, vent, before, shown, tick)
+                elif len(states) > before and state.mode != "active":
+                    left += 1
+                if left > after:
+                    return states
         raise LinkError("The wristband's telemetry has ended in the middle of a pulse.")
 
     def draw(self) -> tuple[float, float | None, float]:
