@@ -4,6 +4,10 @@ TYPE_CHECKING = False  # as of `typing`, which is not waited for
 if TYPE_CHECKING:
     from bubbleskin import patterns as patterns
     from bubbleskin.async_skin import AsyncSkin
+    from bubbleskin.bringup.findings import Finding
+    from bubbleskin.bringup.questions import Question
+    from bubbleskin.bringup.report import BringUp
+    from bubbleskin.bringup.session import bring_up
     from bubbleskin.browser.live import live
     from bubbleskin.calibrate.measure import CalibrationProgress
     from bubbleskin.calibrate.result import BubbleCalibration, SelfCalibration
@@ -61,6 +65,7 @@ if TYPE_CHECKING:
 _ROOMS = {
     "After": "sequence.steps",
     "AsyncSkin": "async_skin",
+    "BringUp": "bringup.report",
     "BubbleCalibration": "calibrate.result",
     "BubbleskinError": "errors",
     "Calibration": "membrane",
@@ -72,6 +77,7 @@ _ROOMS = {
     "DeviceRestarted": "errors",
     "DeviceSilent": "errors",
     "Fault": "device.faults",
+    "Finding": "bringup.findings",
     "Health": "device.health",
     "Info": "device.info",
     "InvalidInput": "errors",
@@ -86,6 +92,7 @@ _ROOMS = {
     "Recording": "telemetry.recording",
     "Replayed": "replays.run",
     "Repeat": "sequence.steps",
+    "Question": "bringup.questions",
     "RigidContact": "contact.rigid",
     "SelfCalibration": "calibrate.result",
     "Sequence": "sequence.model",
@@ -103,6 +110,7 @@ _ROOMS = {
     "YeohBalloon": "membrane",
     "YeohFit": "membrane",
     "aconnect": "connecting",
+    "bring_up": "bringup.session",
     "build_table": "membrane",
     "connect": "connecting",
     "fit_contact": "contact.fit",
@@ -120,6 +128,7 @@ _MODULES = {"patterns": "patterns", "sequences": "sequence.library", "shapes": "
 __all__ = [
     "After",
     "AsyncSkin",
+    "BringUp",
     "BubbleCalibration",
     "BubbleskinError",
     "Calibration",
@@ -131,6 +140,7 @@ __all__ = [
     "DeviceRestarted",
     "DeviceSilent",
     "Fault",
+    "Finding",
     "Health",
     "Info",
     "InvalidInput",
@@ -142,6 +152,7 @@ __all__ = [
     "Plan",
     "PlaybackReport",
     "PlaybackStatus",
+    "Question",
     "Recording",
     "Repeat",
     "Replayed",
@@ -162,6 +173,7 @@ __all__ = [
     "YeohBalloon",
     "YeohFit",
     "aconnect",
+    "bring_up",
     "build_table",
     "connect",
     "fit_contact",

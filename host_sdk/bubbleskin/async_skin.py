@@ -275,6 +275,15 @@ class AsyncSkin:
         if left_ms:
             await self.sleep(left_ms * 1e-3 + self.info.tick)
 
+    async def inject(self, part: str, number: int, how: str) -> None:
+        """See `Skin.inject`."""
+        if self.simulated is None:
+            raise InvalidInput(
+                f"{self.link.transport.name} is no simulated board, and only those can be made to fail: connect to sim://, "
+                "micropython:// or rp2040://."
+            )
+        self.simulated.inject(part, number, checks.text("how", how))
+
     async def settings(self) -> dict[str, Setting]:
         """See `Skin.settings`."""
         return settings_of(await self.link.call("SETTING_READ"))

@@ -253,6 +253,15 @@ class Skin(Pictured):
         """Acknowledge faults up to this entry of `fault_log`, or its id; what has come since stays. Waits as `clear_faults`."""
         run_sync(self._skin.acknowledge(fault))
 
+    def inject(self, part: str, number: int, how: str) -> None:
+        """Make a part of a simulated board fail: `inject("sensor", 3, "stuck")`; "healthy" mends it.
+
+        Parts: sensor, fill valve, vent valve, tube, bubble, by the bubble's `number`; supply, pump, link, clock, which have none
+        (0). Hows: off, stuck, wrong, noisy, slow, delayed, intermittent, missing; docs/simulator.md says which part can be what.
+        Raises `InvalidInput` for others, and on a real board.
+        """
+        run_sync(self._skin.inject(part, number, how))
+
     def settings(self) -> dict[str, Setting]:
         """What can be set: deadman_hold, deadman_vent (s), budget_kpa_s, atmosphere_kpa, rezero_mm; values in use and limits."""
         return run_sync(self._skin.settings())

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
+from bubbleskin.sim.wiring import Wiring
 
 pytestmark = pytest.mark.chip
 
@@ -88,6 +89,23 @@ def test_the_emergency_stop_vents_within_a_tick(emulated):
     skin.show(DOME["wristband7"], wait=False)
     skin.sleep(3 * board.tick_s)
     assert not vented(board)
+
+
+def test_a_board_that_is_wired_wrongly_moves_what_is_wired(emulated):
+    """Place 1 leads to bubble 4 and its sensor says so: the firmware notices nothing. Vent 6 has no current."""
+    board = (skin := emulated("wristband7", wiring=Wiring(tubes=((1, 4),), dead=("vent6",)))).simulated
+    skin.show([5.0, 9.0, 5.0, 5.0, 5.0, 5.0, 5.0])
+    assert board.height_mm.argmax() == 4
+    assert np.abs(board.height_mm[4] - 9.0) < 0.2
+    skin.show([5.0] * 6 + [9.0], wait=False)
+    skin.sleep(0.3)
+    assert board.height_mm[6] < 7.0
+    assert 6 in skin.faults()
+
+
+def test_an_emergency_stop_the_wrong_way_round_is_found(emulated):
+    found = bs.bring_up(emulated("wristband7", wiring=Wiring(estop="open")))
+    assert [finding.name for finding in found.findings] == ["estop_normally_open"]
 
 
 def test_a_converter_that_is_missing_is_named_after_boot(emulated):

@@ -14,9 +14,11 @@ from bubble_protocol.schema import messages
 from bubbleskin import boards
 from bubbleskin.link.message import encode, session_key
 from bubbleskin.replays.compare import NOT_COMPARED, Decided, first_difference
+from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
 from bubbleskin.sim.micropython import MicroPythonFirmware
-from bubbleskin.sim.trace_file import LOOK, POWER_FAILED, TICK, Call, read
+from bubbleskin.sim.trace_file import LOOK, LOOP, POWER_FAILED, TICK, Call, read
+from bubbleskin.sim.wiring import Wiring
 
 ALL = "sim://wristband7?seed=2&spread=0.1&loss=0.03"
 
@@ -269,8 +271,6 @@ def test_a_board_of_ones_own_is_replayed_with_its_file(tmp_path):
 @pytest.mark.medium
 def test_what_comes_between_two_ticks_is_replayed(tmp_path):
     """A board that is served is told of bytes between ticks."""
-    from bubbleskin.sim.board import SimulatedBoard
-
     board = SimulatedBoard()
     board.keep_history()
     recording = board.record(tmp_path / "served.jsonl")
@@ -284,3 +284,20 @@ def test_what_comes_between_two_ticks_is_replayed(tmp_path):
     assert bs.replay(recording.path).identical
     with pytest.raises(bs.InvalidInput, match=r"begins when power comes, and that was 0\.25 s ago"):
         board.keep_history()
+
+
+def test_an_emergency_stop_is_replayed_where_there_is_a_pin(tmp_path):
+    for estop, moves in (("closed", [1, 0]), ("open", [1, 0, 1])):
+        board = SimulatedBoard(wiring=Wiring(estop=estop))
+        board.keep_history()
+        recording = board.record(tmp_path / f"{estop}.jsonl")
+        for pressed in (None, 1, 0):
+            if pressed is not None:
+                board.inject("estop", 0, pressed)
+            for _ in range(40):
+                board.tick()
+        recording.close()
+        assert [call.phase_us for call in read(recording.path).calls() if call.kind == LOOP] == moves
+        assert bs.replay(recording.path).identical
+    with pytest.raises(bs.InvalidInput, match="no pin for an emergency stop"):
+        bs.replay(recording.path, firmware=Path(bs.__file__).parents[2])

@@ -1,4 +1,4 @@
-"""Write the table of tolerances into `docs/simulator.md`, from the one that the simulator draws from.
+"""Write the tables of tolerances and of failures into `docs/simulator.md`, from those that the simulator has.
 
 python tools/generate/plant_page.py            # write it
 python tools/generate/plant_page.py --check    # fail if it is not what would be written
@@ -8,11 +8,28 @@ from pathlib import Path
 
 import generated
 
+from bubbleskin.sim.failures import TABLE
 from bubbleskin.sim.parameters import PlantParameters, Supply
 from bubbleskin.sim.tolerances import IDEAL, REAL, SPRINGS, SUPPLY, SUPPLY_OFFSET, Tolerance
 
 PATH = Path("docs/simulator.md")
 BEGIN, END = "<!-- tolerances: made by tools/generate/plant_page.py -->\n", "<!-- end of tolerances -->\n"
+
+
+FAIL_BEGIN, FAIL_END = "<!-- failures: made by tools/generate/plant_page.py -->\n", "<!-- end of failures -->\n"
+
+
+def failures() -> str:
+    """What can fail in which way, and what it does then."""
+    lines = ["| part | how | what it does |", "|---|---|---|"]
+    lines += [f"| {failure.part} | {failure.how} | {failure.meaning} |" for failure in TABLE]
+    return "\n".join(lines) + "\n"
+
+
+def between(text: str, begin: str, end: str, table: str) -> str:
+    """The text with this table between its marks."""
+    before, rest = text.split(begin)
+    return before + begin + "\n" + table + "\n" + end + rest.split(end)[1]
 
 
 def line(row: Tolerance, nominal: float, where: str) -> str:
@@ -36,10 +53,9 @@ def table() -> str:
 
 
 def page() -> str:
-    """The page with the table of today."""
+    """The page with the tables of today."""
     text = (generated.ROOT / PATH).read_text(encoding="utf-8")
-    before, rest = text.split(BEGIN)
-    return before + BEGIN + "\n" + table() + "\n" + END + rest.split(END)[1]
+    return between(between(text, BEGIN, END, table()), FAIL_BEGIN, FAIL_END, failures())
 
 
 if __name__ == "__main__":

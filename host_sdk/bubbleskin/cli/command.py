@@ -11,6 +11,7 @@ import click
 
 from bubbleskin.cli import (
     bench,
+    bring_up,
     calibrate,
     demonstrations,
     device,
@@ -19,6 +20,7 @@ from bubbleskin.cli import (
     fit_contact,
     flash,
     hil,
+    inject,
     membrane,
     monitor,
     plan,
@@ -57,6 +59,8 @@ for _command in (
     *membrane.commands,
     *fit_contact.commands,
     *calibrate.commands,
+    *bring_up.commands,
+    *inject.commands,
     *plot.commands,
     *bench.commands,
     *firmware.commands,

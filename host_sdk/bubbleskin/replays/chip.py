@@ -9,11 +9,12 @@ from itertools import islice
 from types import ModuleType
 
 from bubble_firmware.hal.lockstep import LINK_OUT
+from bubble_protocol.schema.faults import ESTOP
 from bubbleskin import boards
 from bubbleskin.errors import BubbleskinError, InvalidInput
 from bubbleskin.replays.compare import Decided
 from bubbleskin.replays.players import Player
-from bubbleskin.sim.trace_file import LOOK, POWER_FAILED, Call, Head
+from bubbleskin.sim.trace_file import LOOK, LOOP, POWER_FAILED, Call, Head
 from bubbleskin.toolchain.frozen import BARE
 from bubbleskin.toolchain.rp2040 import built, firmware
 
@@ -80,6 +81,10 @@ def play(calls):
             reset()
             print()
             continue
+        if kind == {loop}:
+            hal.active_faults = hal.active_faults & ~{estop} | phase * {estop}
+            print()
+            continue
         if kind == {listen}:
             app.listen()
         else:
@@ -114,6 +119,8 @@ class ChipPlayer(Player):
                 link_out=LINK_OUT,
                 reset=POWER_FAILED,
                 listen=LOOK,
+                loop=LOOP,
+                estop=ESTOP,
             )
         )
         for offset in range(0, len(head.flash), 256):

@@ -49,6 +49,9 @@ class Decided(NamedTuple):
     sent: bytes
 
 
+NOTHING = Decided((), 0, False, b"")
+"""Of a call after which there are no decisions."""
+
 Found = tuple[str, Any, Any]
 
 

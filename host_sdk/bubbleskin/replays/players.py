@@ -11,11 +11,11 @@ from types import ModuleType
 
 from bubbleskin import boards
 from bubbleskin.errors import InvalidInput
-from bubbleskin.replays.compare import Decided
+from bubbleskin.replays.compare import NOTHING, Decided
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.micropython import HEAP, LockstepFirmware, board_import
-from bubbleskin.sim.trace_file import POWER_FAILED, TICK, Call, Head
+from bubbleskin.sim.trace_file import LOOP, POWER_FAILED, TICK, Call, Head
 from bubbleskin.toolchain.interpreter import own_micropython
 from bubbleskin.toolchain.unix import micropython
 
@@ -73,6 +73,9 @@ class FirmwarePlayer(Player):
             if call.kind == POWER_FAILED:
                 firmware.reset()
                 yield call, Decided((), 0, False, self._flash_crc())
+            elif call.kind == LOOP:
+                firmware.open_loop(bool(call.phase_us))
+                yield call, NOTHING
             elif call.kind == TICK:
                 yield call, _decided(firmware.tick(_counts(call.counts), call.link))
             else:

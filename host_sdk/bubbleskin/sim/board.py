@@ -14,17 +14,20 @@ from bubble_firmware.hal.lockstep import LINK_IN
 from bubbleskin import boards, checks
 from bubbleskin.errors import InvalidInput
 from bubbleskin.sim import plant_file
+from bubbleskin.sim.failures import Failures
 from bubbleskin.sim.firmware import Firmware, InProcessFirmware, Outputs
 from bubbleskin.sim.flash import NorFlash
 from bubbleskin.sim.history import History, TraceFile
+from bubbleskin.sim.impairment import Impairment
 from bubbleskin.sim.recipe import PlantOptions, make_plant
+from bubbleskin.sim.wiring import Wires, Wiring
 
 
 class Simulated(ABC):
     """A simulated wristband in virtual time: it moves only when it is stepped, and the same calls give the same bytes.
 
     What the link, the simulator's server and a script need of one, whatever runs its firmware. `board`, `seed`, `spread`,
-    `contact` and `options` are those of `SimulatedBoard`.
+    `contact`, `wiring` and `options` are those of `SimulatedBoard`.
     """
 
     def __init__(
@@ -34,6 +37,7 @@ class Simulated(ABC):
         seed: int = 0,
         spread: float = 0.0,
         contact: bool = True,
+        wiring: Wiring | None = None,
         **options: Unpack[PlantOptions],
     ):
         self.data = boards.load(board)
@@ -46,6 +50,13 @@ class Simulated(ABC):
         self.contact = contact
         """Whether its bubbles push each other."""
         self.plant = make_plant(self.data, seed, spread, contact, **options)
+        self.wiring = _wiring(wiring, options.get("plant"), self.data.BUBBLES)
+        """What of it is wired wrongly."""
+        self.line: Impairment | None = None
+        """How its line is impaired, where that was injected."""
+        self.clock_pace = 1.0
+        """Seconds of the host's clock in one of the device's, where that was injected."""
+        self._failures = Failures(self)
         self.to_device = bytearray()
         """Bytes of the link that the firmware has not read yet."""
         self.from_device = bytearray()
@@ -77,7 +88,8 @@ class Simulated(ABC):
         """
         plant = self.plant
         figures = replace(plant.parameters, conditioned=np.maximum(plant.largest_stretch, 1.0))
-        plant_file.write(path, figures, f"The plant of {self.name} with seed={self._seed}, after {plant.time:.3f} s")
+        about = f"The plant of {self.name} with seed={self._seed}, after {plant.time:.3f} s"
+        plant_file.write(path, figures, about, self.wiring)
 
     no_history = "its history is not kept. Connect without history=0, or call keep_history() before its first step"
     """Why it cannot be recorded in full where `history` is None."""
@@ -108,13 +120,40 @@ class Simulated(ABC):
     def listen(self, phase_us: int) -> None:
         """Let the firmware answer what has come over the link, `phase_us` µs after the last tick; no time passes."""
 
+    def inject(self, fault: str, number: int = 0, value: str | float = 1.0) -> None:
+        """Make a part fail: `inject("sensor", 3, "stuck")`, by the words of `bubbleskin.sim.failures`; "healthy" mends it.
+
+        Or one of `Plant.inject`, with a number for its value: `inject("leak", 3, 5e-8)`; 0 mends it. Or `inject("estop")`, which
+        presses the emergency stop. `number` is the bubble's. Raises `InvalidInput`.
+        """
+        number = checks.whole("The number of the bubble", number, 0, self.data.BUBBLES - 1)
+        checks.text("fault", fault)
+        if isinstance(value, str):
+            self._failures.inject(fault, number, value)
+        else:
+            self._inject(fault, number, checks.number("value", value))
+
     @abstractmethod
-    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
-        """Make something fail, as of `Plant.inject`: `number` is the bubble's. A value of 0 mends it."""
+    def _inject(self, fault: str, number: int, value: float) -> None:
+        """Make something fail that has a value."""
+
+    def _loop_is_open(self, pressed: bool) -> bool:
+        """Whether the loop through the emergency stop is open, by its contact."""
+        return pressed == (self.wiring.estop == "closed")
 
     @abstractmethod
     def close(self) -> None:
         """End the firmware."""
+
+
+def _wiring(asked: Wiring | None, plant: str | Path | None, n: int) -> Wiring:
+    """What was asked for, or what stands in the plant's file; `InvalidInput` for both."""
+    filed = plant_file.read_wiring(plant, n) if plant is not None else Wiring()
+    if asked is None or asked.right:
+        return filed
+    if not filed.right:
+        raise InvalidInput(f"The plant {plant} says how the board is wired; leave {', '.join(asked.said)} out.")
+    return asked.checked(n)
 
 
 class SimulatedBoard(Simulated):
@@ -124,7 +163,8 @@ class SimulatedBoard(Simulated):
     sensors differ from the nominal and from each other, 0.1 for ± 10 %; 0 matches the board's tables. The
     reservoir starts full, as on a board that has been powered for a while. `contact`: whether bubbles push each
     other, as real ones do; without it each is alone, which shows what the control law itself does. `firmware`: what
-    runs the firmware; None is this interpreter, with `flash` for its store. `options`: `PlantOptions`, such as `rubber="real"`.
+    runs the firmware; None is this interpreter, with `flash` for its store. `wiring`: what is wired wrongly.
+    `options`: `PlantOptions`, such as `rubber="real"`.
     """
 
     def __init__(
@@ -136,11 +176,16 @@ class SimulatedBoard(Simulated):
         contact: bool = True,
         firmware: Firmware | None = None,
         flash: NorFlash | None = None,
+        wiring: Wiring | None = None,
         **options: Unpack[PlantOptions],
     ):
-        super().__init__(board, seed=seed, spread=spread, contact=contact, **options)
+        super().__init__(board, seed=seed, spread=spread, contact=contact, wiring=wiring, **options)
         n = self.data.BUBBLES
+        self._wires = None if self.wiring.right else Wires(self.wiring, n)
+        self._pressed = False  # the emergency stop
         self.firmware = firmware or InProcessFirmware(self.data, self._seed + 1, flash)
+        if self._loop_is_open(pressed=False):
+            self.firmware.open_loop(True)
         self._pulses = np.zeros((n, 2))
         self._pulses[:, 1] = self.tick_s
         self._pump = 0.0  # duty, 0 to 1
@@ -154,6 +199,8 @@ class SimulatedBoard(Simulated):
         if self.plant.time:
             raise InvalidInput(f"A history begins when power comes, and that was {self.plant.time:g} s ago.")
         self.history = History(self.data, self.firmware)
+        if self._loop_is_open(pressed=False):
+            self.history.loop(True)
 
     @property
     def time(self) -> float:
@@ -172,12 +219,20 @@ class SimulatedBoard(Simulated):
 
     def tick(self) -> None:
         """One period: the firmware reads the sensors and decides, while the plant goes on as decided before."""
+        wires = self._wires
         self.plant.read(self._sensed)
+        if wires:
+            self._sensed[:-1] = self._sensed[wires.channels]
         link = self._link_in()
         outputs = self.firmware.tick(self._counts, link)
         if self.history:
             self.history.tick(self._counts, link, outputs)
-        self.plant.advance(self.tick_s, self._pulses[:, 0], self._pulses[:, 1], self._pump, self._dump)
+        if self._pressed:
+            self._lose_current()
+        if wires:
+            wires.advance(self.plant, self.tick_s, self._pulses, self._pump, self._dump)
+        else:
+            self.plant.advance(self.tick_s, self._pulses[:, 0], self._pulses[:, 1], self._pump, self._dump)
         self._take(outputs)
 
     def listen(self, phase_us: int) -> None:
@@ -206,16 +261,25 @@ class SimulatedBoard(Simulated):
         """Power fails and comes back: the firmware starts again, with what flash holds; bytes under way are lost."""
         self.to_device.clear()
         self.from_device.clear()
-        self._pulses[:] = 0.0, self.tick_s
-        self._pump, self._dump, self._decided = 0.0, False, None
+        self._lose_current()
         self.firmware.reset()
         if self.history:
             self.history.reset()
 
-    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
-        """Make bubble `number` fail, as of `bubbleskin.sim.plant.Plant.inject`; a value of 0 mends it."""
-        number = checks.whole("The number of the bubble", number, 0, self.data.BUBBLES - 1)
-        self.plant.inject(checks.text("fault", fault), number, checks.number("value", value))
+    def _lose_current(self) -> None:
+        """Valves and pump are without current: fill shut, vent open."""
+        self._pulses[:] = 0.0, self.tick_s
+        self._pump, self._dump, self._decided = 0.0, False, None
+
+    def _inject(self, fault: str, number: int, value: float) -> None:
+        if fault == "estop":
+            is_open = self._loop_is_open(value != 0)
+            self.firmware.open_loop(is_open)
+            if self.history:
+                self.history.loop(is_open)
+            self._pressed = value != 0
+        else:
+            self.plant.inject(fault, number, value)
 
     def close(self) -> None:
         """End the firmware."""

@@ -40,8 +40,9 @@ def way_out(air, supply, dump):  # type: ignore[no-untyped-def]
     opening = (air.pressure - supply.atmosphere - supply.relief_pressure) / supply.relief_range
     if air.relief_stuck > 0.0:
         opening = 0.0
-    if dump or opening > 0.0:
-        return supply.dump_conductance * ((1.0 if dump else 0.0) + min(max(opening, 0.0), 1.0))
+    dumps = (dump or air.dump_stuck > 0.0) and air.dump_stuck >= 0.0
+    if dumps or opening > 0.0:
+        return supply.dump_conductance * ((1.0 if dumps else 0.0) + min(max(opening, 0.0), 1.0))
     return 0.0
 
 

@@ -8,6 +8,8 @@ from typing import NamedTuple
 from bubble_firmware.app import App
 from bubble_firmware.hal.base import Hal
 from bubble_firmware.hal.lockstep import LINK_OUT
+from bubble_protocol.schema.faults import ESTOP
+from bubbleskin.errors import InvalidInput
 from bubbleskin.sim import jit
 from bubbleskin.sim.flash import NorFlash
 
@@ -47,6 +49,15 @@ class Firmware(ABC):
     @abstractmethod
     def listen(self, link: bytes, phase_us: int) -> Outputs:
         """Bytes of the link, `phase_us` µs after a period has begun."""
+
+    def open_loop(self, is_open: bool) -> None:
+        """The loop through the emergency stop is open from now on, as when the button is pressed, or closed.
+
+        As it stands here, `InvalidInput`: in lockstep with another process there are no pins.
+        """
+        raise InvalidInput(
+            "What runs the firmware here has no pin for an emergency stop: it cannot be pressed or wired. Use sim:// or rp2040://."
+        )
 
     @abstractmethod
     def reset(self) -> None:
@@ -92,6 +103,10 @@ class InProcessFirmware(Firmware, Hal):
     def flash_image(self) -> bytes:
         """See `Firmware`."""
         return bytes(self.flash.image)
+
+    def open_loop(self, is_open: bool) -> None:
+        """See `Firmware`."""
+        self.active_faults = self.active_faults | ESTOP if is_open else self.active_faults & ~ESTOP
 
     def reset(self) -> None:
         """See `Firmware`."""

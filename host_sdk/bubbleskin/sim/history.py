@@ -12,7 +12,7 @@ from bubbleskin.device.state import State
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import guarded, path_of
 from bubbleskin.sim.firmware import Firmware, Outputs
-from bubbleskin.sim.trace_file import LOOK, POWER_FAILED, TICK, Calls, Head, board_crc, end_line
+from bubbleskin.sim.trace_file import LOOK, LOOP, POWER_FAILED, TICK, Calls, Head, board_crc, end_line
 from bubbleskin.telemetry.recording import Sink
 from bubbleskin.toolchain.frozen import BARE, device_files, digest
 
@@ -54,6 +54,10 @@ class History:
         image = self._firmware.flash_image()
         crc = zlib.crc32(image).to_bytes(4, "little") if image is not None else b""
         self._called(POWER_FAILED, 0, b"", Outputs(array("H"), 0, False, crc))
+
+    def loop(self, is_open: bool) -> None:
+        """The loop through the emergency stop has opened, or closed."""
+        self._called(LOOP, int(is_open), b"", Outputs(array("H"), 0, False, b""))
 
     def record(self, path: str | os.PathLike[str]) -> "TraceFile":
         """Begin a file with all that has been, to which all that comes is added until it is closed. Raises `InvalidInput`."""

@@ -113,7 +113,9 @@ def _advance(bubbles, reservoir, contact, coils, dt, substeps, pump, dump):  # t
     _set_windows(bubbles, coils, dt)
     for k in range(substeps):
         gauge = air.pressure - supply.atmosphere
-        pumped = _pump_flow(gauge, pump, supply.pump_free_flow, supply.pump_stall, supply.atmosphere)
+        pumped = 0.0
+        if air.pump_off == 0.0:
+            pumped = _pump_flow(gauge, pump, supply.pump_free_flow, supply.pump_stall, supply.atmosphere)
         dumped = 0.0
         conductance = _way_out(air, supply, dump)
         if conductance > 0.0:

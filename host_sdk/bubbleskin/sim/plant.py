@@ -15,6 +15,7 @@ from bubbleskin.contact.energy import BUBBLE, SPRINGS
 from bubbleskin.errors import InvalidInput
 from bubbleskin.membrane.balloon import yeoh_pressure
 from bubbleskin.sim import devices, kernel, records
+from bubbleskin.sim.live import Live
 from bubbleskin.sim.parameters import RUBBERS, PlantParameters, Supply
 from bubbleskin.sim.pneumatics import REFERENCE_TEMPERATURE, VISCOSITY_EXPONENT
 from bubbleskin.sim.real import kernel as real_kernel
@@ -98,6 +99,9 @@ class Plant:
             real_rest.begin(self._state, self._air, parameters)
         else:
             self._warm()
+        self.live = Live(self.inject)
+        """Failures that move by themselves."""
+        self._nominal = self._constants.copy(), self._supply.copy()  # what `change` multiplies
         self._fill_on, self._vent_on = np.zeros(n), np.zeros(n)
         self._noise = np.zeros(n + 1)
         self._rng = np.random.default_rng(seed)
@@ -151,6 +155,8 @@ class Plant:
         """
         if not 0.0 <= dt < math.inf:
             raise InvalidInput(f"dt is {dt!r}; the plant can only step forward by a finite number of seconds")
+        if self.live:
+            self.live.step(self.time)
         self._fill_on[:] = fill_on
         self._vent_on[:] = vent_on
         # A hair less than the quotient: 5 ms in steps of 50 µs are 100 steps, whatever the rounding says.
@@ -165,6 +171,8 @@ class Plant:
         if self._into[0] is not counts:
             self._into = counts, _address(counts)
         self._sense(*self._plant, *self._read, self._into[1])
+        if self.live:
+            self.live.read(self.time, counts)
 
     def sense(self) -> NDArray[np.uint16]:
         """Read the bubbles' sensors, at the valve nodes: (n,) counts of 17 Pa, 160 at zero gauge."""
@@ -189,6 +197,7 @@ class Plant:
 
         Of the reservoir, whatever the `bubble`: `supply_stuck`, `supply_bias`, `supply_absent` the same of its sensor;
         `supply_flat`: Pa that this says, with noise, whatever the pressure; `relief_stuck`: 1 for a relief valve that stays shut.
+        `pump_off`: 1 for a pump that brings nothing. `dump_stuck`: 1 for a dump valve stuck open, -1 stuck closed.
         """
         if fault in records.SUPPLY_FAILURES:
             self._air[fault] = value
@@ -197,6 +206,19 @@ class Plant:
         else:
             known = ", ".join(records.FAILURES + records.SUPPLY_FAILURES)
             raise InvalidInput(f"no failure is called {fault!r}; choose one of {known}")
+
+    def change(self, figure: str, bubble: int, factor: float) -> None:
+        """Let a figure be `factor` times what it was at the start: of `bubble`, or, such as "supply.volume", of the reservoir."""
+        section, _, name = figure.rpartition(".")
+        now, begin = (self._supply, self._nominal[1]) if section else (self._constants, self._nominal[0])
+        place = 0 if section else bubble
+        now[name][place] = factor * begin[name][place]
+
+    def says(self, sensor: int) -> int:
+        """The count that a bubble's sensor says now, at least 1, or with -1 the reservoir's."""
+        counts = np.empty(len(self._state) + 1, np.uint16)
+        self.read(counts)
+        return max(int(counts[sensor]), 1)
 
     def rest_at(self, height_mm: ArrayLike) -> None:
         """Put every bubble at rest at `height_mm`, one for all or (n,): valves shut, line at its pressure.
@@ -221,11 +243,13 @@ class Plant:
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy everything that changes, failures and noise generator included, for `restore`."""
-        return self._state.copy(), self._air.copy(), self._place.copy(), self.time, self._rng.bit_generator.state
+        changing = self._state, self._air, self._place, self._constants, self._supply
+        return *(array.copy() for array in changing), self.time, self._rng.bit_generator.state
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Go back to a `snapshot` of this plant."""
-        self._state[:], self._air[:], self._place[:], self.time, self._rng.bit_generator.state = snapshot
+        self._state[:], self._air[:], self._place[:], self._constants[:], self._supply[:] = snapshot[:5]
+        self.time, self._rng.bit_generator.state = snapshot[5:]
 
     @property
     def stretch(self) -> NDArray[np.float64]:

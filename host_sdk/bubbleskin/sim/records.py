@@ -16,7 +16,15 @@ enough not to show, large enough for steps of 50 µs: h k < 2 DRAG even where si
 FAILURES = ("leak", "pop_off", "fill_stuck", "vent_stuck", "sensor_stuck", "sensor_absent", "sensor_bias")
 """What can be made to fail, all 0 when healthy; `Plant.inject` says what the values mean."""
 
-SUPPLY_FAILURES = ("supply_stuck", "supply_flat", "supply_bias", "supply_absent", "relief_stuck")
+SUPPLY_FAILURES = (
+    "supply_stuck",
+    "supply_flat",
+    "supply_bias",
+    "supply_absent",
+    "relief_stuck",
+    "pump_off",
+    "dump_stuck",
+)
 """The same of the reservoir."""
 
 REAL = (

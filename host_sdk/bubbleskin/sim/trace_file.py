@@ -24,8 +24,10 @@ from bubbleskin.errors import InvalidInput
 
 TRACE_FORMAT = 1
 KIND = "full recording"
-TICK, LOOK, POWER_FAILED = range(3)
-"""What is called: a tick, a look at the link between two, power that fails and comes back."""
+TICK, LOOK, POWER_FAILED, LOOP = range(4)
+"""What is called: a tick, a look at the link between two, power that fails and comes back, the emergency stop's loop."""
+DECIDED = (TICK, LOOK)
+"""Calls after which there are decisions."""
 
 _WHAT = "the full recording"
 _FILE_MOST = 256 * 2**20
@@ -42,15 +44,15 @@ class Call(NamedTuple):
     """One call of the firmware: what it was given, and what it decided."""
 
     kind: int
-    """TICK, LOOK or POWER_FAILED."""
+    """TICK, LOOK, POWER_FAILED or LOOP."""
     phase_us: int
-    """Of LOOK: µs since the tick began."""
+    """Of LOOK: µs since the tick began. Of LOOP: 1 where it opens, as when the stop is pressed, 0 where it closes."""
     counts: bytes
     """Of TICK: one little-endian u16 per sensor, the supply's last."""
     link: bytes
     """What came over the link."""
     pulses: tuple[int, ...]
-    """µs per period: fill and vent valve of each bubble in turn. Of POWER_FAILED: none."""
+    """µs per period: fill and vent valve of each bubble in turn. Of others than TICK and LOOK: none."""
     pump: int
     dump: bool
     sent: bytes
@@ -280,12 +282,12 @@ def _unpacked(block: Block, bubbles: int, where: str) -> Iterator[Call]:
         raise damaged
     heads = np.frombuffer(data, "<u2", _HEAD * count).reshape(_HEAD, count).T
     kinds, _, ins, outs, _, dumps = heads.T
-    ticks, decisions = int((kinds == TICK).sum()), int((kinds != POWER_FAILED).sum())
+    ticks, decisions = int((kinds == TICK).sum()), int(np.isin(kinds, DECIDED).sum())
     at = 2 * _HEAD * count
     rest = at + 2 * (ticks * sensors + decisions * valves)
     if (
         len(data) != rest + int(ins.sum()) + int(outs.sum())
-        or kinds.max() > POWER_FAILED
+        or kinds.max() > LOOP
         or ins.max() > LINK_IN
         or outs.max() > LINK_OUT
         or dumps.max() > 1
@@ -303,7 +305,7 @@ def _unpacked(block: Block, bubbles: int, where: str) -> Iterator[Call]:
             phase,
             next(counts).tobytes() if kind == TICK else b"",
             data[came : came + size_in],
-            tuple(next(pulses)) if kind != POWER_FAILED else (),
+            tuple(next(pulses)) if kind in DECIDED else (),
             pump,
             bool(dump),
             data[went : went + size_out],

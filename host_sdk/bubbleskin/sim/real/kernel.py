@@ -128,7 +128,9 @@ def _advance(bubbles, reservoir, touch, coils, dt, substeps, pump, dump):  # typ
     for k in range(substeps):
         warm = air.pressure * supply.volume / air.air
         gauge = air.pressure - supply.atmosphere
-        pumped = _pump_flow(gauge, pump, supply.pump_free_flow, supply.pump_stall, supply.atmosphere)
+        pumped = 0.0
+        if air.pump_off == 0.0:
+            pumped = _pump_flow(gauge, pump, supply.pump_free_flow, supply.pump_stall, supply.atmosphere)
         dumped = dumped_heat = 0.0
         conductance = _way_out(air, supply, dump)
         if conductance > 0.0:

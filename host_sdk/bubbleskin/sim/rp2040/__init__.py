@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.sim.recipe import PlantOptions
+from bubbleskin.sim.wiring import Wiring
 from bubbleskin.toolchain.rp2040 import built
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ def open_chip(
     spread: float = 0.0,
     contact: bool = True,
     absent: tuple[str, ...] = (),
+    wiring: Wiring | None = None,
     **options: Unpack[PlantOptions],
 ) -> "Rp2040Board":
     """The board `name` on an emulated RP2040, booted as far as USB.
@@ -36,6 +38,8 @@ def open_chip(
         )
     from bubbleskin.sim.rp2040.board import Rp2040Board
 
-    board = Rp2040Board(name, firmware, seed=seed, spread=spread, contact=contact, absent=absent, **options)
+    board = Rp2040Board(
+        name, firmware, seed=seed, spread=spread, contact=contact, absent=absent, wiring=wiring, **options
+    )
     board.boot()
     return board

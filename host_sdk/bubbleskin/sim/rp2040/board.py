@@ -15,7 +15,8 @@ from bubbleskin.sim.rp2040.banks import Bank, Pca9685Bank, PwmBank
 from bubbleskin.sim.rp2040.bus import SpiBus
 from bubbleskin.sim.rp2040.chip import BOOT_S, Chip
 from bubbleskin.sim.rp2040.mcp3208 import Mcp3208
-from bubbleskin.sim.rp2040.valves import FILL, VENT, Valves
+from bubbleskin.sim.rp2040.valves import Valves
+from bubbleskin.sim.wiring import FILL, VENT, Wiring
 
 FAILURES = ("converter_silent", "driver_silent", "supply_lost", "estop", "hang")
 """What can be made to fail beside what `Plant.inject` knows."""
@@ -54,9 +55,10 @@ class Rp2040Board(Simulated):
         spread: float = 0.0,
         contact: bool = True,
         absent: tuple[str, ...] = (),
+        wiring: Wiring | None = None,
         **options: Unpack[PlantOptions],
     ):
-        super().__init__(board, seed=seed, spread=spread, contact=contact, **options)
+        super().__init__(board, seed=seed, spread=spread, contact=contact, wiring=wiring, **options)
         self.chip = Chip(firmware)
         self.from_device = self.chip.from_device
         self._supply_lost = False
@@ -77,13 +79,18 @@ class Rp2040Board(Simulated):
                 spi.add(converter, pin)
             first += inputs
         self._disabled = True
+        self._pressed = False
+        self._coils = self.wiring.coils(data.BUBBLES).tolist()
+        self._channels = self.wiring.channels(data.BUBBLES).tolist()
+        for valve in set(range(VENT, 2 * data.BUBBLES, 2)) - set(self._coils):
+            self._valves.set(valve // 2, VENT, True)  # no output drives it: open
         chip.on_pin(data.PIN_DISABLE, self._disable)
         if data.VALVES == "pwm":
             self._bank: Bank = PwmBank(chip, data, self._drive)
         else:
             self._bank = Pca9685Bank(chip, data, self._drive, absent)
         chip.on_pin(data.PIN_DUMP, lambda level: self._valves.dump(level is True or self._supply_lost))
-        chip.mcu.gpio[data.PIN_ESTOP].set_input_value(False)  # the loop through the button, unbroken
+        self._press(False)
         convert = chip.mcu.adc.on_adc_read
         supply_input = data.PIN_SUPPLY - 26
 
@@ -97,7 +104,7 @@ class Rp2040Board(Simulated):
 
     def _input(self, first: int, inputs: int) -> Callable[[int], int]:
         def sample(channel: int) -> int:
-            return int(self._valves.advance().sense()[first + channel]) if channel < inputs else 0
+            return int(self._valves.advance().sense()[self._channels[first + channel]]) if channel < inputs else 0
 
         return sample
 
@@ -105,20 +112,36 @@ class Rp2040Board(Simulated):
         disabled = level is not False  # pulled up
         if disabled != self._disabled:
             self._disabled = disabled
-            for bubble in range(self.data.BUBBLES):
-                self._drive(bubble)
+            self._drive_all()
+
+    def _press(self, pressed: bool) -> None:
+        """The emergency stop: one contact is in the loop that a pin reads, the other in the valves' and the pump's supply."""
+        self._pressed = pressed
+        self.chip.mcu.gpio[self.data.PIN_ESTOP].set_input_value(self._loop_is_open(pressed))
+
+    def _drive_all(self) -> None:
+        for bubble in range(self.data.BUBBLES):
+            self._drive(bubble)
 
     def _pump_duty(self) -> float:
         carrier = pump_carrier(self.chip, self.data)
-        if self._supply_lost or not carrier.csr & 1 or self.chip.mcu.gpio[self.data.PIN_PUMP].function_select != 4:
+        if (
+            self._supply_lost
+            or self._pressed
+            or not carrier.csr & 1
+            or self.chip.mcu.gpio[self.data.PIN_PUMP].function_select != 4
+        ):
             return 0.0
         return min((carrier.cc & 0xFFFF) / (carrier.top + 1), 1.0)
 
     def _drive(self, bubble: int) -> None:
-        """Bring the valves of one bubble in line with what drives them: without current fill is shut and vent open."""
-        fill, vent = (False, False) if self._disabled else self._bank.coils(bubble)
-        self._valves.set(bubble, VENT, not vent)
-        self._valves.set(bubble, FILL, fill)
+        """Bring what one bubble's outputs drive in line with them: without current a fill valve is shut and a vent valve open."""
+        currents = (False, False) if self._disabled or self._pressed else self._bank.coils(bubble)
+        for output in (VENT, FILL):
+            coil = self._coils[2 * bubble + output]
+            if coil >= 0:
+                valve = coil % 2
+                self._valves.set(coil // 2, valve, currents[output] != (valve == VENT))
 
     # ---- the names of SimulatedBoard
 
@@ -157,11 +180,12 @@ class Rp2040Board(Simulated):
     def listen(self, phase_us: int) -> None:
         """Nothing: the chip looks at its link when it likes."""
 
-    def inject(self, fault: str, number: int = 0, value: float = 1.0) -> None:
+    def _inject(self, fault: str, number: int, value: float) -> None:
         """Make something fail, as of `Plant.inject` or one of `FAILURES`; a value of 0 mends it.
 
         `converter_silent`, `driver_silent`: chip `number` answers no more. `supply_lost`: the pump stands still
-        and the reservoir empties. `estop`: the button is pressed. `hang`: the program is stuck from now on.
+        and the reservoir empties. `estop`: the button is pressed, so the valves have no current. `hang`: the program is
+        stuck from now on.
         """
         on = value != 0
         self._valves.advance()
@@ -173,7 +197,8 @@ class Rp2040Board(Simulated):
             self._supply_lost = on
             self._valves.dump(on)
         elif fault == "estop":
-            self.chip.mcu.gpio[self.data.PIN_ESTOP].set_input_value(on)
+            self._press(on)
+            self._drive_all()
         elif fault == "hang":
             self.chip.hang()
         else:
