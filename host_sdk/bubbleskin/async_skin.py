@@ -22,6 +22,7 @@ from bubbleskin.device.trim import check as check_trim
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
+from bubbleskin.link.errors import not_simulated
 from bubbleskin.link.link import Link
 from bubbleskin.link.message import Message
 from bubbleskin.link.transport import Transport
@@ -58,8 +59,7 @@ class AsyncSkin:
         self.simulated = simulated
         link.on_open = self._opened
         self._player = Player(link, info, layout)
-        touch = simulated is None or simulated.contact
-        self._shows = Shows(link, info, layout, self._player, touch=touch)
+        self._shows = Shows(link, info, layout, self._player, touch=simulated is None or simulated.contact)
         self._telemetry = Telemetry(link, info, self._shows.tell)
         self.clock = Clock(info.tick, link.transport.now)
         """The device's time, from the pings so far; `synchronise` sends some."""
@@ -278,10 +278,7 @@ class AsyncSkin:
     async def inject(self, part: str, number: int, how: str) -> None:
         """See `Skin.inject`."""
         if self.simulated is None:
-            raise InvalidInput(
-                f"{self.link.transport.name} is no simulated board, and only those can be made to fail: connect to sim://, "
-                "micropython:// or rp2040://."
-            )
+            raise not_simulated(self.link.transport.name)
         self.simulated.inject(part, number, checks.text("how", how))
 
     async def settings(self) -> dict[str, Setting]:

@@ -10,20 +10,24 @@ from bubbleskin.studio.editor import FIRST, Editor
 from bubbleskin.studio.owner import Owner
 
 
-def met(act, url="sim://wristband7"):
-    """What `act(editor, owner)`, a coroutine, says of an editor that knows the wristband at `url`."""
+@pytest.fixture
+def met(in_a_loop):
+    """`met(act, url)`: what `act(editor, owner)`, a coroutine, says of an editor that knows the wristband at `url`."""
 
-    async def run():
-        owner = Owner()
-        editor = Editor(owner)
-        await owner.open(url)
-        try:
-            editor.meet()
-            return await act(editor, owner)
-        finally:
-            await owner.close()
+    def run(act, url="sim://wristband7"):
+        async def whole():
+            owner = Owner()
+            editor = Editor(owner)
+            await owner.open(url)
+            try:
+                editor.meet()
+                return await act(editor, owner)
+            finally:
+                await owner.close()
 
-    return asyncio.run(run())
+        return in_a_loop(whole())
+
+    return run
 
 
 async def _foreseen(editor):
@@ -42,7 +46,7 @@ async def _foreseen(editor):
         ("a.csv", b"", "a.csv"),
     ],
 )
-def test_what_is_no_sequence_is_refused_and_changes_nothing(name, data, why):
+def test_what_is_no_sequence_is_refused_and_changes_nothing(met, name, data, why):
     async def act(editor, owner):
         before = editor.timeline.sequence
         said = await editor.upload(name, data)
@@ -54,7 +58,7 @@ def test_what_is_no_sequence_is_refused_and_changes_nothing(name, data, why):
     assert "/tmp" not in said
 
 
-def test_a_saved_file_has_a_name_that_is_no_path():
+def test_a_saved_file_has_a_name_that_is_no_path(met):
     async def act(editor, owner):
         for name in ("../../a b", "", "päth/é", "x" * 99):
             await editor.upload("a.json", bs.Sequence([bs.Step([6.0] * 7, 0.5)], name=name).to_json().encode())
@@ -68,7 +72,7 @@ def test_a_saved_file_has_a_name_that_is_no_path():
     assert names == ["a-b.json", "sequence.json", "p-th.json", f"{'x' * 40}.json"]
 
 
-def test_another_wristband_keeps_what_was_edited_and_only_that():
+def test_another_wristband_keeps_what_was_edited_and_only_that(met):
     async def act(editor, owner):
         assert editor.timeline.sequence == LIBRARY[FIRST](owner.skin.layout)
         await owner.open("sim://wristband19")
@@ -90,7 +94,7 @@ def test_nothing_is_edited_before_there_is_a_wristband():
         editor.saved()
 
 
-def test_the_newest_is_foreseen_however_quick_changes_come():
+def test_the_newest_is_foreseen_however_quick_changes_come(met):
     async def act(editor, owner):
         for height in (6.0, 7.0, 8.0, 9.0):
             change = {"kind": "place", "step": 0, "row": 0, "height": height, "revision": editor.timeline.revision}

@@ -337,8 +337,8 @@ def test_the_library_and_a_pattern_are_opened(studio, edit):
     page.get_by_role("button", name="Open it").click()
     page.get_by_role("combobox", name="Rows").select_option("all")  # at once: the page does not know the ripple yet
     assert studio.until(lambda: edited(studio).name == "ripple")
+    page.wait_for_function("document.querySelectorAll('[data-row]').length === 1")
     keyframe(page, 0, 15).wait_for()
-    assert page.locator("[data-row]").count() == 1
     line = page.get_by_role("textbox", name="Of a pattern")
     line.fill("wave.slwo(2)")
     page.get_by_role("button", name="Make keyframes of it").click()

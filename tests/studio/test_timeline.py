@@ -192,6 +192,9 @@ def test_what_is_too_long_or_too_high_is_refused_and_nothing_is_lost():
         timeline.change({"kind": "place", "step": 0, "row": 0, "height": 15.0}, None)
     with pytest.raises(bs.InvalidInput, match="only step"):
         timeline.change({"kind": "delete", "step": 0, "last": 0, "row": -1}, None)
+    for field in ({"ramp": None}, {"until": {"after": None}}, {"until": {"timeout_s": None}}):
+        with pytest.raises(bs.InvalidInput, match="is empty"):
+            timeline.change({"kind": "step", "step": 0, **field}, None)
     assert state_of(timeline) == (bs.Sequence([bs.Step([6.0] * N, 1.0)]).to_json(), False, False)
 
 

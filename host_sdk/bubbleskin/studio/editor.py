@@ -62,6 +62,7 @@ class Editor:
             self._skin = skin
             touch = skin.simulated is None or skin.simulated.contact
             self._foresight = Foresight(skin.layout, skin.info, touch=touch)
+            self.forecast = self.tops_mm = None
             self._fit(skin)
             self._think()
 
@@ -186,7 +187,7 @@ class Editor:
                 if forecast is None or forecast.sequence is not sequence or forecast.by is not self._foresight:
                     wanted = partial(self._is_edited, sequence)
                     forecast = await asyncio.to_thread(self._foresight.follow, sequence, wanted)
-                if forecast is None:
+                if forecast is None or forecast.by is not self._foresight:
                     continue
                 self.forecast = forecast
                 self.tops_mm = await asyncio.to_thread(forecast.tops_at, time_ms)
@@ -198,7 +199,8 @@ class Editor:
             self._thinking = None
 
     def _is_edited(self, sequence: Sequence) -> bool:
-        return self._timeline is not None and self._timeline.sequence is sequence
+        """Whether that is still what is edited, for the wristband that there is."""
+        return self._owner.skin is self._skin and self._timeline is not None and self._timeline.sequence is sequence
 
     # Where it plays.
 

@@ -138,6 +138,8 @@ class Timeline:
         if not isinstance(kind, str) or kind not in CHANGES:
             raise InvalidInput("The page asks for a change that there is not; reload it.")
         try:
+            if kind not in _MAY_BE_EMPTY and None in {**what, **what.get("until", {})}.values():
+                raise InvalidInput("A field is empty; give it a value.")
             CHANGES[kind](self, what, self.rows(layout))
         except InvalidInput:
             raise
@@ -232,3 +234,5 @@ CHANGES: dict[str, Callable[[Timeline, Message, list[Row]], None]] = {
     "rows": lambda timeline, what, rows: timeline.show_rows(what["rows"]),
 }
 """What a page can ask for, by its name."""
+_MAY_BE_EMPTY = ("place", "add")
+"""Those in which no height has a meaning."""
