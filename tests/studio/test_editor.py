@@ -109,5 +109,7 @@ def test_the_newest_is_foreseen_however_quick_changes_come(met):
         editor.change({"kind": "place", "step": 0, "row": 0, "height": 6.0, "revision": 0})
         assert "changed elsewhere" in editor.problem
         assert editor.timeline.sequence is forecast.sequence
+        editor.change({"kind": "rows", "rows": "all", "revision": 0})  # which changes nothing of it
+        assert (editor.problem, editor.timeline.rows_are) == ("", "all")
 
     met(act)

@@ -242,8 +242,10 @@ def test_what_cannot_be_had_is_marked(studio, edit):
     keyframe(page, 0, 1).focus()
     for _ in range(6):
         page.keyboard.press("PageDown")
+    assert studio.until(lambda: edited(studio) == short(6.0, 7.0))
+    assert studio.until(lambda: (now := studio.studio.desk.editor.forecast) and now.sequence is edited(studio))
     page.locator(".timeline-says").wait_for(state="detached")
-    assert page.locator(".handle.passes, .handle.off").count() == 0
+    page.wait_for_function("!document.querySelector('.handle.passes, .handle.off')")
     endless = bs.Sequence([bs.Repeat([bs.Step([6.0] * 7, 0.5)], 0), bs.Step([7.0] * 7, 0.5, name="end")])
     upload(page, endless.to_json())
     page.get_by_text("Step 1 (end) is never played: the repeat before it has no end.").wait_for()
