@@ -21,10 +21,15 @@ _RATE_HZ = 50
 
 
 class Show(NamedTuple):
-    """One shape: its title and the states from the command to `SECONDS` later."""
+    """One shape: its title and the states from the command to `SECONDS` later.
+
+    `height_mm`: of every state, (states, n): where bubbles truly stood on a simulated board, else what was told. `true`: which.
+    """
 
     title: str
     states: list[State]
+    height_mm: NDArray[np.float64]
+    true: bool
 
 
 def watch(skin: Skin, title: str, heights_mm: NDArray[np.float64], report: Callable[[State, float], None]) -> Show:
@@ -32,10 +37,17 @@ def watch(skin: Skin, title: str, heights_mm: NDArray[np.float64], report: Calla
 
     Raises `DeviceFault` where the shape does not stand at the end.
     """
+    board = skin.simulated
+
+    def heights(state: State) -> NDArray[np.float64]:
+        return state.height_mm if board is None else board.height_mm.copy()
+
     states = [skin.state()]
+    stood = [heights(states[0])]
     skin.show(heights_mm, wait=False)
     for state in skin.telemetry(_RATE_HZ):
         states.append(state)
+        stood.append(heights(state))
         since = state.time - states[0].time
         report(state, since)
         if since >= SECONDS:
@@ -44,4 +56,4 @@ def watch(skin: Skin, title: str, heights_mm: NDArray[np.float64], report: Calla
         raise DeviceFault(
             f"The {title} does not stand after {SECONDS:g} s. Run `bubbleskin info` and look at supply pressure and faults."
         )
-    return Show(title, states)
+    return Show(title, states, np.array(stood), board is not None)

@@ -24,10 +24,10 @@ def shows() -> tuple[bs.Layout, list[Show]]:
 
 
 def numbers() -> str:
-    rows = ["shape,bubble,asked mm,reached mm"]
-    for title, states in shows()[1]:
-        asked, reached = states[-1].target_mm, states[-1].height_mm
-        rows += [f"{title},{i},{asked[i]:.2f},{reached[i]:.1f}" for i in range(len(asked))]
+    rows = ["shape,bubble,asked mm,true mm"]
+    for show in shows()[1]:
+        asked, true = show.states[-1].target_mm, show.height_mm[-1]
+        rows += [f"{show.title},{i},{asked[i]:.2f},{true[i]:.1f}" for i in range(len(asked))]
     return "\n".join(rows) + "\n"
 
 

@@ -64,8 +64,12 @@ def colours() -> ScalarMappable:
     return ScalarMappable(Normalize(LOW_MM, HIGH_MM), "viridis")
 
 
+_BETWEEN = (0.34, 0.66)
+"""Of the way from one centre to the other: there a line crosses no number."""
+
+
 class Above:
-    """The array from above: spheres at their places, lower ones beneath; forces of contact as lines between centres.
+    """The array from above: spheres at their places, lower ones beneath; contact as lines between them, as wide as it is strong.
 
     Everything that moves is drawn by `update`, which may be called again and again: `artists` are those things.
     """
@@ -96,7 +100,8 @@ class Above:
             line.remove()
         self._forces = []
         for contact in shape.contacts:
-            ends = centre[[contact.first, contact.second]]
+            first, second = centre[[contact.first, contact.second]]
+            ends = np.array([first + share * (second - first) for share in _BETWEEN])
             width = 0.6 + 8 * contact.force
             self._forces += self._axes.plot(ends[:, 0], ends[:, 1], color="#D55E00", lw=width, alpha=0.8, zorder=4)
 
