@@ -106,6 +106,12 @@ def pointer_ms(studio: Studio, page: Page) -> tuple[float, float, int]:
     return float(np.median(waits)), float(np.percentile(waits, 95)), len(waits)
 
 
+def say_pointer(studio: Studio, page: Page) -> None:
+    median, most, moves = pointer_ms(studio, page)
+    bubbles = len(studio.owner.skin.layout)
+    print(f"pointer to target, {bubbles} bubbles: median {median:.0f} ms, p95 {most:.0f} ms of {moves} targets")
+
+
 def picture(studio: Studio, context: BrowserContext, loop: asyncio.AbstractEventLoop) -> None:
     """A dome on nineteen bubbles, as docs/studio.md shows it."""
     skin = studio.owner.skin
@@ -160,8 +166,7 @@ def main() -> None:
         page.locator("[data-bubble='0'][aria-label]").wait_for()
         loop.call_soon_threadsafe(lambda: loop.create_task(wave(studio)))
         print(f"live, 19 bubbles that all move: {drawn_hz(page):.1f} of {RATE_HZ:g} updates/s drawn")
-        median, most, moves = pointer_ms(studio, page)
-        print(f"pointer to target, 19 bubbles: median {median:.0f} ms, p95 {most:.0f} ms of {moves} targets")
+        say_pointer(studio, page)
         if chosen.picture:
             picture(studio, context, loop)
             editor_picture(studio, context)
@@ -171,6 +176,8 @@ def main() -> None:
             print(
                 f"synthetic, {len(Layout.hexagon(rings))} bubbles: {drawn_hz(page):.1f} of {RATE_HZ:g} updates/s drawn"
             )
+        asyncio.run_coroutine_threadsafe(studio.owner.open("sim://wristband7"), loop).result(30)
+        say_pointer(studio, page)
         browser.close()
     studio.leave()
 
