@@ -1,6 +1,7 @@
 """The demonstration: a few shapes in a row, and how the bubbles got there."""
 
 from collections.abc import Callable
+from contextlib import closing
 from typing import NamedTuple
 
 import numpy as np
@@ -45,13 +46,14 @@ def watch(skin: Skin, title: str, heights_mm: NDArray[np.float64], report: Calla
     states = [skin.state()]
     stood = [heights(states[0])]
     skin.show(heights_mm, wait=False)
-    for state in skin.telemetry(_RATE_HZ):
-        states.append(state)
-        stood.append(heights(state))
-        since = state.time - states[0].time
-        report(state, since)
-        if since >= SECONDS:
-            break
+    with closing(skin.telemetry(_RATE_HZ)) as telemetry:  # a Ctrl-C in a generator that is forgotten would be, too
+        for state in telemetry:
+            states.append(state)
+            stood.append(heights(state))
+            since = state.time - states[0].time
+            report(state, since)
+            if since >= SECONDS:
+                break
     if not states[-1].arrived:
         raise DeviceFault(
             f"The {title} does not stand after {SECONDS:g} s. Run `bubbleskin info` and look at supply pressure and faults."

@@ -1,5 +1,6 @@
 """How well the line to a wristband works: round trips, frames that were damaged, telemetry that did not come."""
 
+from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -64,13 +65,14 @@ def check_line(skin: "Skin", seconds: float) -> LineCheck:
     skin.link.on_ping = note
     try:
         pinged = before.time
-        for state in skin.telemetry(min(RATE_HZ, 1 / skin.info.tick)):
-            states, lost = states + 1, state.lost
-            if state.time - pinged >= _PING_EVERY_S:
-                pinged = state.time
-                skin.synchronise(1)
-            if state.time - before.time >= seconds:
-                break
+        with closing(skin.telemetry(min(RATE_HZ, 1 / skin.info.tick))) as telemetry:
+            for state in telemetry:
+                states, lost = states + 1, state.lost
+                if state.time - pinged >= _PING_EVERY_S:
+                    pinged = state.time
+                    skin.synchronise(1)
+                if state.time - before.time >= seconds:
+                    break
     finally:
         skin.link.on_ping = usual
     after = skin.health()

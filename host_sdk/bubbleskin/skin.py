@@ -1,7 +1,7 @@
 """What a script holds: one wristband, real or simulated. `AsyncSkin` does the work; this runs it without an event loop."""
 
 import os
-from collections.abc import AsyncGenerator, Iterable, Iterator, Sequence
+from collections.abc import AsyncGenerator, Generator, Iterable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, NoReturn, Self, overload
 
@@ -131,7 +131,7 @@ class Skin(Pictured):
         """
         run_sync(self._skin.restart(into))
 
-    def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> Iterator[State]:
+    def telemetry(self, rate_hz: float = 20, fields: Iterable[str] | None = None) -> Generator[State, None, None]:
         """States as the device sends them, without end; close the iterator or leave the loop to end it.
 
         There is one telemetry at a time: a new one ends the one before it. `fields` chooses what is sent, so that more

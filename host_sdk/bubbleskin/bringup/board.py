@@ -62,7 +62,7 @@ class Board:
         self.skin.vent()
         self.flatten()
         states = []
-        with closing(self.skin.telemetry(1.0 / self.skin.info.tick, ("pressure", "faults"))) as telemetry:  # type: ignore[type-var]
+        with closing(self.skin.telemetry(1.0 / self.skin.info.tick, ("pressure", "faults"))) as telemetry:
             for state in telemetry:
                 states.append(state)
                 if state.time - states[0].time > _REST_S:
@@ -121,7 +121,7 @@ class Board:
         skin, before = self.skin, round(_BEFORE_S / self.skin.info.tick)
         states: list[State] = []
         active = left = 0
-        with closing(skin.telemetry(1.0 / skin.info.tick, _FIELDS)) as telemetry:  # type: ignore[type-var]
+        with closing(skin.telemetry(1.0 / skin.info.tick, _FIELDS)) as telemetry:
             for state in telemetry:
                 states.append(state)
                 active += state.mode == "active"
