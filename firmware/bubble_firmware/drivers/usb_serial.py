@@ -3,8 +3,7 @@
 
 `sys.stdin.buffer.readinto` waits until the buffer is full. It also takes bytes from an `os.dupterm` stream
 as soon as the port has none, so a stream of filler bytes stands there: a read always returns at once, and
-the stream's position tells how many bytes at the end are filler. It is read only where `select` says that bytes have come: that
-looks at the port alone, the filler has no poll, and costs a quarter of a read in vain.
+the stream's position tells how many bytes at the end are filler.
 
 A write waits for as long as half a second when its 256 bytes of buffer are full. How full they are can
 only be counted: they are empty when, after the USB stack has run, the IN endpoint's hardware buffers are
@@ -14,7 +13,6 @@ its buffer for as long as that holds something.
 
 import io
 import os
-import select
 import sys
 
 import micropython
@@ -50,28 +48,17 @@ class UsbSerial:
         self._more = bytearray(_CHUNK)
         self._waiting = 0
         os.dupterm(self._filler)
-        self._poll = select.poll()
-        self._poll.register(sys.stdin, select.POLLIN)
-
-    def ready(self) -> bool:
-        """Whether bytes have come."""
-        for _ in self._poll.ipoll(0):  # 0 ms
-            return True
-        return False
 
     def receive(self, buffer: bytearray) -> int:
         """Put the bytes that have come at the start of `buffer`; returns how many."""
-        ready = self.ready()
-        if self._waiting and not _sending():
-            self._waiting = 0
-        if not ready:
-            return 0
         filler = self._filler
         at = filler.tell()
         if at > _REWIND:
             filler.seek(0)
             at = 0
         self._in.readinto(self._first)
+        if self._waiting and not _sending():
+            self._waiting = 0
         if filler.tell() != at:
             return 0
         more = self._more

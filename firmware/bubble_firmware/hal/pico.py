@@ -29,14 +29,12 @@ if TYPE_CHECKING:
 
 # [constants] bubble_protocol.schema.faults: ESTOP SENSOR_CHIP VALVE_CHIP WATCHDOG
 # [constants] bubble_protocol.schema.system: BOOT_LOADER PROMPT
-# [constants] bubble_firmware.hal.base: LISTEN
 _ESTOP = const(1)
 _SENSOR_CHIP = const(8)
 _VALVE_CHIP = const(4)
 _WATCHDOG = const(32)
 _BOOT_LOADER = const(1)
 _PROMPT = const(2)
-_LISTEN = const(-1)
 # [end of constants]
 
 _WATCHDOG_MS = 80
@@ -45,8 +43,7 @@ _ROM_SEGMENT = 2  # of `vfs.rom_ioctl`
 _SPI_HZ = 2000000
 _I2C_HZ = 1000000
 _I2C_TIMEOUT_US = 2000  # a stuck bus costs so much, once
-_IDLE_US = 1200  # `machine.idle` ends with an interrupt, or after 1 ms
-_LISTEN_US = 1500  # before the period ends: a request that is not slow takes less
+_MS_US = 1000
 _HEAP_LOW = 65536  # bytes
 
 _PWM = pwm.BASE
@@ -89,7 +86,6 @@ class PicoHal(Hal):
         Pin(board.PIN_MISO, Pin.ALT, pull=Pin.PULL_UP, alt=Pin.ALT_SPI)
         self._supply = ADC(Pin(board.PIN_SUPPLY))
         self._link = UsbSerial()
-        self._ready = self._link.ready
         self.receive = self._link.receive
         self.send = self._link.send
         # Our own UF2 has flash for the store, see micropython.cmake. Another MicroPython has files.
@@ -113,7 +109,7 @@ class PicoHal(Hal):
         self.phase_us = phase_us
 
     def wait(self) -> int:
-        """Sleep until the next period has begun: how many have begun since the last call, or LISTEN before."""
+        """Sleep until the next period has begun; returns how many have begun since the last call."""
         if not self._running:
             gc.collect()
             WDT(timeout=_WATCHDOG_MS)
@@ -123,15 +119,8 @@ class PicoHal(Hal):
         if pwm.wrapped(_PWM) and not self._overrun_allowed:
             self.late_ticks += 1
         else:  # after a tick that was allowed to overrun, too: what begins in the middle of a period is late for the next one
-            ready = self._ready
-            while left > _IDLE_US:
-                if left > _LISTEN_US and ready():
-                    return _LISTEN
-                machine.idle()
-                before = left
-                left = self._tick_us - pwm.phase(_PWM)
-                if left > before:  # the period has ended meanwhile
-                    break
+            if left > _MS_US + 200:
+                time.sleep_ms((left - 200) // _MS_US)
             while not pwm.wrapped(_PWM):
                 pass
         if self._valves.stopped:

@@ -77,17 +77,17 @@ class Server:
 
     def poll(self) -> None:
         """Once a tick: handle what has come; send telemetry when it is due."""
-        self.listen(_BUDGET)
+        self.listen()
         self.telemetry.tick()
 
-    def listen(self, budget: int = 1) -> None:
-        """Handle what has come, `budget` requests at most; between two ticks one, and none that is slow."""
+    def listen(self) -> None:
+        """Handle what has come."""
         if self.sender.unsent:
             self.sender.flush()
         chunk = self._chunk
         decoder = self.decoder
         window = self.window
-        self._budget = budget
+        self._budget = _BUDGET
         end = self._hal.receive(chunk)
         at = 0
         while at < end:
@@ -96,7 +96,7 @@ class Server:
                 self.take(decoder.message_id, decoder.sequence)
         while window.early and self._budget > 0:
             length = window.waiting()
-            if not length or self._cost(window.slot()[1]) > self._budget:
+            if not length:
                 break
             self._handle_next(window.slot(), length)
 
@@ -143,14 +143,10 @@ class Server:
         elif ahead < _REPLIES_KEPT and (message_id == _STOP or message_id == _VENT):
             self._overtake(ahead)
             self._handle_next(decoder.frame, decoder.length)
-        elif ahead == 0 and self._cost(message_id) <= self._budget:
+        elif ahead == 0 and self._budget > 0:
             self._handle_next(decoder.frame, decoder.length)
         elif ahead < _WINDOW:
             window.keep(number, decoder.frame, decoder.length)
-
-    def _cost(self, message_id: int) -> int:
-        """Of the budget. What is slow takes all of a tick's, and has no room between two."""
-        return _BUDGET if message_id in self._slow else 1
 
     def _overtake(self, requests: int) -> None:
         """So many requests will never be handled, nor answered unless they come again."""
@@ -163,7 +159,7 @@ class Server:
     def _handle_next(self, frame: bytearray, length: int) -> None:
         """Handle the request whose turn it is."""
         message_id = frame[1]
-        self._budget -= self._cost(message_id)
+        self._budget -= _BUDGET if message_id in self._slow else 1
         self._hear()
         self.reply.begin(message_id, self.window.expected, True)
         self.window.advance()
