@@ -50,7 +50,7 @@ PATCHES = (  # file, what is there, what takes its place
     (
         "ports/rp2/mpconfigport.h",
         r"(#define MICROPY_OPT_COMPUTED_GOTO +\(1\)\n)",
-        r"\1#define MICROPY_OPT_MAP_LOOKUP_CACHE_SIZE (1024)\n",
+        r"\1#define MICROPY_OPT_MAP_LOOKUP_CACHE_SIZE (512)\n",
     ),
     (
         "py/map.c",
