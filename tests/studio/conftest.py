@@ -91,7 +91,7 @@ def studio(running):
     return running
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")  # not longer: its event loop runs in this thread, where other tests run theirs
 def chromium():
     if CHROMIUM is None:
         pytest.skip("there is no Chromium here: apt-get install chromium")
