@@ -1,7 +1,9 @@
 """What all tests share: the real MicroPython, and how hypothesis looks for counterexamples."""
 
 import os
+import signal
 import subprocess
+import sys
 from textwrap import dedent
 
 import pytest
@@ -56,6 +58,23 @@ def command(capsys, monkeypatch):
             main(list(map(str, arguments)))
         out, err = capsys.readouterr()
         return end.value.code, out, err
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def start():
+    """`start(verb, …)`: `bubbleskin` as a process that Ctrl-C ends; a shell's background job would have it ignored."""
+
+    def run(*arguments, stdout=subprocess.PIPE, **options):
+        return subprocess.Popen(
+            [sys.executable, "-m", "bubbleskin", *map(str, arguments)],
+            stdout=stdout,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+            **options,
+        )
 
     return run
 

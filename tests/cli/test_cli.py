@@ -135,15 +135,8 @@ def test_demo_prints_heights_and_draws(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_sim_serves_other_programs_until_it_is_interrupted():
-    command = [sys.executable, "-m", "bubbleskin", "sim", "--json", "--port", "0"]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
-    ) as server:
+def test_sim_serves_other_programs_until_it_is_interrupted(start):
+    with start("sim", "--json", "--port", 0) as server:
         try:
             device = json.loads(server.stdout.readline())["device"]
             show = [sys.executable, "-m", "bubbleskin", "show", "--shape", "dome", "--device", device]

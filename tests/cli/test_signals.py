@@ -8,7 +8,6 @@ import threading
 
 import pytest
 
-RUN = [sys.executable, "-m", "bubbleskin"]
 MICROPYTHON = ["--device", "micropython://wristband7"]
 SIM = ["--device", "sim://wristband7?realtime=1"]
 
@@ -25,17 +24,9 @@ VERBS = {
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("verb", VERBS)
-def test_ctrl_c_ends_with_130_and_no_traceback(verb):
+def test_ctrl_c_ends_with_130_and_no_traceback(verb, start):
     environment = os.environ | {"BUBBLESKIN_LOG": "debug"}
-    running = subprocess.Popen(
-        RUN + VERBS[verb],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
-    )
+    running = start(*VERBS[verb], stdout=subprocess.DEVNULL, env=environment, start_new_session=True)
     said, open_ = [], threading.Event()
 
     def listen():
@@ -74,21 +65,14 @@ PYTHONS_OWN = ("init_import_site", "Could not import runpy module", "_get_module
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("verb", ["info", "plan", "plot", "demo"])
 @pytest.mark.parametrize("seconds", FIRST_SECOND)
-def test_ctrl_c_within_the_first_second(verb, seconds, tmp_path):
+def test_ctrl_c_within_the_first_second(verb, seconds, tmp_path, start):
     arguments = {
         "info": ["info", *SIM],
         "plan": ["plan", "--shape", "dome"],
         "plot": ["plot", "curve"],
         "demo": ["demo", *SIM],
     }
-    running = subprocess.Popen(
-        RUN + arguments[verb],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=tmp_path,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    running = start(*arguments[verb], stdout=subprocess.DEVNULL, cwd=tmp_path)
     threading.Event().wait(seconds)
     running.send_signal(signal.SIGINT)
     said = running.communicate(timeout=60)[1]

@@ -170,17 +170,10 @@ def test_a_program_that_is_killed_loses_a_second_at_most(tmp_path):
 
 
 @pytest.mark.medium
-def test_a_board_that_is_served_is_recorded(tmp_path):
+def test_a_board_that_is_served_is_recorded(tmp_path, start):
     """Its bytes come between ticks, and Ctrl-C finishes the file."""
     path = tmp_path / "served.jsonl"
-    command = [sys.executable, "-m", "bubbleskin", "sim", "--port", "0", "--json", "--record", str(path)]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
-    ) as process:
+    with start("sim", "--port", 0, "--json", "--record", path) as process:
         with bs.connect(json.loads(process.stdout.readline())["device"]) as skin:
             skin.show([8.0] * 7, wait=False)
             skin.sleep(0.3)

@@ -15,16 +15,10 @@ LEFT_S = 8.0
 
 
 @pytest.fixture
-def studio(request):
+def studio(request, start):
     """A studio in a process: the process, and what it printed."""
     more = getattr(request, "param", [])
-    process = subprocess.Popen(
-        [sys.executable, "-m", "bubbleskin", "studio", "--port", "0", "--json", "--device", "sim://wristband7", *more],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
-    )
+    process = start("studio", "--port", 0, "--json", "--device", "sim://wristband7", *more)
     yield process, json.loads(process.stdout.readline())
     process.kill()
     process.wait()
