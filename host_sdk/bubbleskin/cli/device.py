@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from bubbleskin import boards
-from bubbleskin.cli.options import Real, as_json, device, gathered, progress
+from bubbleskin.cli.options import Real, as_json, device, device_or_simulated, gathered, progress
 from bubbleskin.connecting import connect
 from bubbleskin.demo import DEMO, SECONDS, Show, watch
 from bubbleskin.device.state import State
@@ -24,14 +23,7 @@ from bubbleskin.skin import Skin
 
 
 @click.group(invoke_without_command=True)
-@click.option(
-    "--device",
-    envvar="BUBBLESKIN_DEVICE",
-    metavar="URL",
-    default=f"sim://{boards.DEFAULT}",
-    show_default=True,
-    show_envvar=True,
-)
+@device_or_simulated
 @click.option(
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),

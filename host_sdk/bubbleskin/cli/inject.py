@@ -9,8 +9,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from bubbleskin import boards
-from bubbleskin.cli.options import Real, as_json
+from bubbleskin.cli.options import Real, as_json, device_or_simulated
 from bubbleskin.connecting import connect
 from bubbleskin.errors import DeviceRefused, InvalidInput, LinkError
 
@@ -23,14 +22,7 @@ _MOVE_MM = 2.0
 
 @click.command()
 @click.argument("words", nargs=-1, metavar="PART [NUMBER] HOW")
-@click.option(
-    "--device",
-    envvar="BUBBLESKIN_DEVICE",
-    metavar="URL",
-    default=f"sim://{boards.DEFAULT}",
-    show_default=True,
-    show_envvar=True,
-)
+@device_or_simulated
 @click.option(
     "--height",
     type=Real(0.0, unit="mm"),

@@ -97,6 +97,16 @@ device = click.option(
     "Default: the only wristband attached.",
 )
 
+device_or_simulated = click.option(
+    "--device",
+    envvar="BUBBLESKIN_DEVICE",
+    metavar="URL",
+    default=f"sim://{boards.DEFAULT}",
+    show_default=True,
+    show_envvar=True,
+)
+"""Of verbs that show something where there is no wristband."""
+
 as_json = click.option("--json", is_flag=True, help="Print JSON, for scripts.")
 
 
