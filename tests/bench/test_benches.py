@@ -34,7 +34,7 @@ def test_a_bench_in_small(name, request):
 
 def test_every_bench_is_listed():
     modules = {module.name for module in pkgutil.iter_modules(bubbleskin.bench.__path__)}
-    assert modules == {*BENCHES, *ON_THE_CHIP, "rows", "report"}
+    assert modules == {*BENCHES, *ON_THE_CHIP, "rows", "report", "pages"}
 
 
 def test_the_command_prints_rows_for_scripts():

@@ -11,7 +11,7 @@ from bubbleskin.sim.rp2040.chip import CLOCK_HZ
 from bubbleskin.sim.rp2040.profiler import INTERRUPT, Profiler, Stack
 from bubbleskin.toolchain.rp2040 import firmware, symbols
 
-REST, LOAD = SITUATIONS = ("at rest", "under load")
+REST, LOAD = "at rest", "under load"
 TICK = "app: App.tick"
 VIPER = "viper"
 _SECONDS = {REST: 0.25, LOAD: 0.5}
@@ -84,11 +84,11 @@ class Profile(NamedTuple):
         return [(name, spent, whole[name]) for name, spent in sorted(own.items(), key=lambda one: -one[1])]
 
 
-def profiles(names: tuple[str, ...] = boards.NAMES, size: float = 1.0) -> Iterator[Profile]:
-    """Profile every board of `names` in every situation; `size`: the share of the time."""
-    for name in names:
-        for situation in SITUATIONS:
-            yield profile(name, situation, size * _SECONDS[situation])
+def profiles() -> Iterator[Profile]:
+    """Profile every board in every situation."""
+    for name in boards.NAMES:
+        for situation, seconds in _SECONDS.items():
+            yield profile(name, situation, seconds)
 
 
 def profile(name: str, situation: str, seconds: float) -> Profile:

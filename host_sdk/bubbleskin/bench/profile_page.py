@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from bubbleskin import files
+from bubbleskin.bench.pages import table_row, with_tables
 from bubbleskin.bench.profile import LOAD, Profile
 
 DATA = Path("docs/data/profile.json")
@@ -40,27 +41,22 @@ def read(root: Path) -> list[Profile]:
 
 def page(root: Path) -> str:
     """The page with the tables of the file's profiles."""
-    before, rest = files.read_text(root / PAGE, "the page").split(BEGIN)
-    return before + BEGIN + "\n" + tables(read(root)) + "\n" + END + rest.split(END)[1]
+    return with_tables(root / PAGE, BEGIN, END, tables(read(root)))
 
 
 def tables(found: list[Profile]) -> str:
     """What the chip does in a tick; and of each board under load, which functions take most of it."""
     kinds = [one.by_kind() for one in found]
-    lines = [_row(["µs of a tick, mean", *(f"{one.board}, {one.situation}" for one in found)])]
-    lines.append(_row(["---"] * (1 + len(found))))
+    lines = [table_row(["µs of a tick, mean", *(f"{one.board}, {one.situation}" for one in found)])]
+    lines.append(table_row(["---"] * (1 + len(found))))
     for kind in sorted(set().union(*kinds), key=lambda kind: -sum(one.get(kind, 0.0) for one in kinds)):
-        lines.append(_row([kind, *(f"{one.get(kind, 0.0):.0f}" for one in kinds)]))
-    lines.append(_row(["a whole tick, interrupts left out", *(f"{one.tick_us:.0f}" for one in found)]))
+        lines.append(table_row([kind, *(f"{one.get(kind, 0.0):.0f}" for one in kinds)]))
+    lines.append(table_row(["a whole tick, interrupts left out", *(f"{one.tick_us:.0f}" for one in found)]))
     for one in found:
         if one.situation == LOAD:
-            lines += ["", _row([f"{one.board}, {LOAD}", "calls a tick", "its own, µs", "with what it calls, µs"])]
-            lines.append(_row(["---"] * 4))
+            lines += ["", table_row([f"{one.board}, {LOAD}", "calls a tick", "its own, µs", "with what it calls, µs"])]
+            lines.append(table_row(["---"] * 4))
             for name, own, whole in one.by_function()[:_SHOWN]:
                 calls = f"{one.calls[name]:.2f}" if name in one.calls else "viper"
-                lines.append(_row([f"`{name}`", calls, f"{own:.0f}", f"{whole:.0f}"]))
+                lines.append(table_row([f"`{name}`", calls, f"{own:.0f}", f"{whole:.0f}"]))
     return "\n".join(lines) + "\n"
-
-
-def _row(cells: list[str]) -> str:
-    return "| " + " | ".join(cells) + " |"

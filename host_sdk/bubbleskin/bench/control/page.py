@@ -13,6 +13,7 @@ from bubbleskin.bench.control.measure import FILL_GOAL, LONG_GOAL_MM, OVERSHOOT_
 from bubbleskin.bench.control.plants import KINDS, Kind
 from bubbleskin.bench.control.runs import HOLDS, LONG, SEARCH, STEP, TO_AND_FRO
 from bubbleskin.bench.control.shows import TIMES_S
+from bubbleskin.bench.pages import table_row, with_tables
 from bubbleskin.bench.rows import Row
 from bubbleskin.errors import InvalidInput
 
@@ -55,7 +56,7 @@ def text_of(figures: Iterable[Figures]) -> str:
 def page(root: Path) -> str:
     """The page with the tables of the file's figures."""
     entries = files.parse_json(files.read_text(root / DATA, "the control bench's figures"), str(DATA))
-    return _shown(root / PAGE, _tables(entries))
+    return with_tables(root / PAGE, BEGIN, END, _tables(entries))
 
 
 def tops_page(root: Path) -> str:
@@ -64,13 +65,8 @@ def tops_page(root: Path) -> str:
     lines = ["| what | value | target |", "|---|---|---|"]
     for name, value, unit, target in rows:
         number = f"{value:g}" if value == int(value) else f"{value:.2f}" if value < 10 else f"{value:.1f}"
-        lines.append(_row([name.removeprefix("touching, "), f"{number} {unit}".rstrip(), target]))
-    return _shown(root / TOPS_PAGE, "\n".join(lines) + "\n")
-
-
-def _shown(path: Path, tables: str) -> str:
-    before, rest = files.read_text(path, "the page").split(BEGIN)
-    return before + BEGIN + "\n" + tables + "\n" + END + rest.split(END)[1]
+        lines.append(table_row([name.removeprefix("touching, "), f"{number} {unit}".rstrip(), target]))
+    return with_tables(root / TOPS_PAGE, BEGIN, END, "\n".join(lines) + "\n")
 
 
 def _rounded(value: Any) -> Any:
@@ -124,7 +120,7 @@ def _held(kind: Kind, found: dict[Any, _Entry]) -> str:
         f"{other['pulses']:.2f}",
         _share(other["settled_wrong"]),
     ]
-    return _row(cells)
+    return table_row(cells)
 
 
 def _counted(kind: Kind, found: dict[Any, _Entry]) -> str:
@@ -133,7 +129,7 @@ def _counted(kind: Kind, found: dict[Any, _Entry]) -> str:
     names = [(short, "faults"), (short, "vent_locks"), (short, "emptied")]
     names += [(one, "faults"), (one, "vent_locks"), (one, "limit_cycles")]
     names += [(other, "vent_locks"), (other, "limit_cycles")]
-    return _row([kind.name, *(str(entry[name]) for entry, name in names)])
+    return table_row([kind.name, *(str(entry[name]) for entry, name in names)])
 
 
 def _others(entries: Sequence[_Entry], found: dict[Any, _Entry]) -> Iterable[str]:
@@ -143,19 +139,15 @@ def _others(entries: Sequence[_Entry], found: dict[Any, _Entry]) -> Iterable[str
         name, other = f"{one['plant']}, {one['use']}", found[one["use"], one["plant"], FIRST]
         if one["use"] == STEP:
             ratios = [_ratio(entry["fill_ratio"]) for entry in (one, other)]
-            yield _row([f"{name}: longest time, by the fastest fill's", f"≤ {FILL_GOAL:g}", *ratios])
+            yield table_row([f"{name}: longest time, by the fastest fill's", f"≤ {FILL_GOAL:g}", *ratios])
             over = [f"{entry['overshoot_mm']:.2f}" for entry in (one, other)]
-            yield _row([f"{name}: overshoot, mm", f"≤ {OVERSHOOT_GOAL_MM:g}", *over])
+            yield table_row([f"{name}: overshoot, mm", f"≤ {OVERSHOOT_GOAL_MM:g}", *over])
         elif one["use"] == TO_AND_FRO:
-            yield _row([f"{name}: RMS, mm", f"≤ {TO_AND_FRO_GOAL_MM:g}", _errors(one), _errors(other)])
+            yield table_row([f"{name}: RMS, mm", f"≤ {TO_AND_FRO_GOAL_MM:g}", _errors(one), _errors(other)])
         elif one["use"] == LONG:
             last = [f"{entry['last_rms_mm']:.3f}" for entry in (one, other)]
-            yield _row([f"{name}: RMS of the last tenth, mm", f"≤ {LONG_GOAL_MM:g}", *last])
-            yield _row([f"{name}: bubbles emptied on their way", "", str(one["emptied"]), "–"])
-
-
-def _row(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
+            yield table_row([f"{name}: RMS of the last tenth, mm", f"≤ {LONG_GOAL_MM:g}", *last])
+            yield table_row([f"{name}: bubbles emptied on their way", "", str(one["emptied"]), "–"])
 
 
 def _errors(entry: _Entry) -> str:
