@@ -44,7 +44,11 @@ class Board:
         return [height_mm if bubble in bubbles else 0.0 for bubble in range(self.skin.info.bubbles)]
 
     def estop(self) -> bool:
-        """Whether the firmware says now that the emergency stop is pressed."""
+        """Whether the firmware says now that the emergency stop is pressed.
+
+        It acknowledges by what its last tick has seen: a stop just released is pressed still until the next.
+        """
+        self.skin.sleep(2 * self.skin.info.tick)
         self.skin.clear_faults()
         return "emergency_stop" in self.skin.health().board_faults
 
