@@ -12,6 +12,7 @@ from bubble_firmware.control.bubbles import Bubbles
 from bubble_firmware.control.table import Tables
 from bubble_firmware.control.trim import Trim
 from bubble_firmware.handlers.faults import FaultHandlers
+from bubble_firmware.handlers.inject import InjectHandlers
 from bubble_firmware.handlers.layout import LayoutHandlers
 from bubble_firmware.handlers.sequence import SequenceHandlers
 from bubble_firmware.handlers.session import SessionHandlers
@@ -92,6 +93,7 @@ class App:
             SettingHandlers(reply, self.clock, self.settings),
             FaultHandlers(reply, board, state, self.commands),
             SystemHandlers(self.server, hal, state, self.stats, self.tables, self.store, self.commands),
+            InjectHandlers(reply, board, hal, self.safety, self._use),
             self.sequence_handlers,
         ):
             self.server.register(handlers)
@@ -184,6 +186,10 @@ class App:
         if not self.clock.ticks & _IDLE_MASK and self.safety.mode == _IDLE:
             hal.idle()
         self.stats.ended(hal.phase_us())
+
+    def _use(self, hal: "Hal") -> None:
+        """From the next tick on, sense and act by this."""
+        self.hal = hal
 
     def _fail(self) -> None:
         self.stats.exceptions += 1

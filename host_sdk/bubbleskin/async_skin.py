@@ -7,22 +7,21 @@ from collections.abc import AsyncGenerator, Iterable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, NoReturn, Self, overload
 
-from bubble_protocol.schema import sequences, system
+from bubble_protocol.schema import injection, sequences, system
 from bubbleskin import checks
 from bubbleskin.device import tables as device_tables
-from bubbleskin.device.faults import Fault, read_log
+from bubbleskin.device import trim as device_trim
+from bubbleskin.device.faults import Fault, acknowledged, read_log
 from bubbleskin.device.health import Health, TickHistogram
 from bubbleskin.device.info import Info
 from bubbleskin.device.layout import find_layout
 from bubbleskin.device.settings import Setting, changes, settings_of
 from bubbleskin.device.state import State
 from bubbleskin.device.store import StoreInfo
-from bubbleskin.device.trim import ROWS_MOST, Trim
-from bubbleskin.device.trim import check as check_trim
+from bubbleskin.device.trim import Trim
 from bubbleskin.errors import InvalidInput, LinkError
 from bubbleskin.layout import Layout
 from bubbleskin.link.clock import PINGS, Clock
-from bubbleskin.link.errors import not_simulated
 from bubbleskin.link.link import Link
 from bubbleskin.link.message import Message
 from bubbleskin.link.transport import Transport
@@ -258,7 +257,7 @@ class AsyncSkin:
 
     async def clear_faults(self) -> None:
         """See `Skin.clear_faults`."""
-        await self._isolation(await self.link.call("CLEAR"))
+        await self.sleep(await acknowledged(self.link, self.info.tick, "CLEAR"))
 
     async def fault_log(self) -> list[Fault]:
         """See `Skin.fault_log`."""
@@ -267,19 +266,21 @@ class AsyncSkin:
     async def acknowledge(self, fault: Fault | int) -> None:
         """See `Skin.acknowledge`."""
         number = fault.id if isinstance(fault, Fault) else checks.whole("The id of a fault", fault, 0, 0xFFFF)
-        await self._isolation(await self.link.call("FAULTS_ACK", (number,)))
-
-    async def _isolation(self, acknowledged: Message) -> None:
-        """Wait until what is acknowledged has been isolated for long enough, and the wristband lets go of it."""
-        left_ms = acknowledged["isolated_ms"]
-        if left_ms:
-            await self.sleep(left_ms * 1e-3 + self.info.tick)
+        await self.sleep(await acknowledged(self.link, self.info.tick, "FAULTS_ACK", (number,)))
 
     async def inject(self, part: str, number: int, how: str) -> None:
         """See `Skin.inject`."""
-        if self.simulated is None:
-            raise not_simulated(self.link.transport.name)
-        self.simulated.inject(part, number, checks.text("how", how))
+        if self.simulated is not None:
+            self.simulated.inject(part, number, checks.text("how", how))
+            return
+        from bubbleskin.sim.failures import on_board
+
+        for request in on_board(part, number, how, self.info.bubbles):
+            await self.link.call("INJECT", request)
+
+    async def permit_injection(self, on: bool = True) -> None:
+        """See `Skin.permit_injection`."""
+        await self.link.call("INJECT", (injection.INJECTION, 0, int(checks.flag("on", on))))
 
     async def settings(self) -> dict[str, Setting]:
         """See `Skin.settings`."""
@@ -306,27 +307,14 @@ class AsyncSkin:
 
     async def trim(self) -> Trim:
         """See `Skin.trim`."""
-        if not self.info.tells_sd:
-            return Trim.of([await self.link.call("TRIM_READ")])
-        replies: list[Message] = []
-        while (first := sum(len(reply.columns["zero"]) for reply in replies)) < self.info.bubbles:
-            replies.append(await self.link.call("CALIBRATION_READ", (first,)))
-        return Trim.of(replies)
+        return await device_trim.read(self.link, self.info)
 
     async def upload_trim(self, trim: Trim, save: bool = False, *, anyway: bool = False) -> None:
         """See `Skin.upload_trim`."""
         checks.instance("trim", trim, Trim, "a Trim, such as dataclasses.replace(skin.trim(), zero=…)")
         checks.flag("save", save)
         checks.flag("anyway", anyway)
-        own = self.info.tells_sd
-        rows = trim.rows(await self.trim()) if own else trim.short_rows(self.info.bubbles)
-        if not anyway:
-            check_trim(trim)
-        if own:
-            for first in range(0, len(rows), ROWS_MOST):
-                await self.link.call("CALIBRATION_WRITE", (first,), rows[first : first + ROWS_MOST])
-        else:
-            await self.link.call("TRIM_WRITE", (), rows)
+        await device_trim.write(self.link, self.info, trim, anyway)
         if save:
             await self.save()
 

@@ -254,13 +254,21 @@ class Skin(Pictured):
         run_sync(self._skin.acknowledge(fault))
 
     def inject(self, part: str, number: int, how: str) -> None:
-        """Make a part of a simulated board fail: `inject("sensor", 3, "stuck")`; "healthy" mends it.
+        """Make a part of the board fail: `inject("sensor", 3, "stuck")`; "healthy" mends it.
 
         Parts: sensor, fill valve, vent valve, tube, bubble, by the bubble's `number`; supply, pump, link, clock, which have none
         (0). Hows: off, stuck, wrong, noisy, slow, delayed, intermittent, missing; docs/simulator.md says which part can be what.
-        Raises `InvalidInput` for others, and on a real board.
+        Raises `InvalidInput` for others. A real board does to itself what harms nobody, once that is permitted: see
+        `permit_injection`.
         """
         run_sync(self._skin.inject(part, number, how))
+
+    def permit_injection(self, on: bool = True) -> None:
+        """Let `inject` make parts of a real board fail, until its next start; `False`: mend them, and forbid it again.
+
+        While all is vented only. Sensors, valves, pump and supply fail there in ways that let no air in and keep none.
+        """
+        run_sync(self._skin.permit_injection(on))
 
     def settings(self) -> dict[str, Setting]:
         """What can be set: deadman_hold, deadman_vent (s), budget_kpa_s, atmosphere_kpa, rezero_mm; values in use and limits."""

@@ -84,8 +84,10 @@ class Packer:
     the highest of each, None where there is none; None where no value has any.
     """
 
-    # As of a message without limits, which most are: where the code is on the heap, there is no room for what says nothing.
+    # As of a message without limits that has not grown, which most are: where the code is on the heap, there is no room for what
+    # says nothing.
     limits: "tuple[Sequence[int | None], Sequence[int | None]] | None" = None
+    _first_size: "int | None" = None
     _lows: "array[int] | None" = None
     _highs: "array[int] | None" = None
 
@@ -103,11 +105,17 @@ class Packer:
         self.stride_values = len(repeated_kinds)
         self.fixed_size = sum(kind & 15 for kind in fixed_kinds)
         self.stride = sum(kind & 15 for kind in repeated_kinds)
-        self.size_min = self.fixed_size if first_size is None else first_size
+        if first_size is not None:
+            self._first_size = first_size
         if limits is not None:
             self.limits = limits
             self._lows = array("i", [-0x80000000 if low is None else low for low in limits[0]])
             self._highs = array("i", [0x7FFFFFFF if high is None else high for high in limits[1]])
+
+    @property
+    def size_min(self) -> int:
+        """See above."""
+        return self.fixed_size if self._first_size is None else self._first_size
 
     def count(self, size: int) -> int:
         """Repetitions in a payload of `size` bytes, or -1 where no payload of this message has that size.
@@ -116,7 +124,8 @@ class Packer:
         `size_min`, by what this one has.
         """
         if self.stride == 0:
-            return 0 if size >= self.size_min else -1
+            least = self._first_size  # and not `size_min`: this is in every request's way
+            return 0 if size >= (self.fixed_size if least is None else least) else -1
         rest = size - self.fixed_size
         if rest < 0 or rest % self.stride:
             return -1

@@ -241,3 +241,25 @@ def test_monitor_records_what_it_shows(tmp_path, capsys):
     rows = [line for line in path.read_text().splitlines() if not line.startswith("#")]
     assert len(rows) == 12
     assert rows[0].startswith("time_s,mode,lost,supply_kpa,board_faults,height_mm_0")
+
+
+@pytest.mark.slow
+def test_a_real_board_fails_only_with_permission_and_is_well_afterwards(run, start):
+    """One that is served: nobody who opens it knows that it is simulated."""
+    with start("sim", "--json", "--port", 0) as server:
+        try:
+            device = json.loads(server.stdout.readline())["device"]
+            assert_one_sentence(
+                run("inject", "sensor", "3", "missing", "--device", device), 2, "--permit", "nobody wears it"
+            )
+            for words, name in (("sensor 3 missing", "sensor_lost"), ("supply missing", "supply_lost")):
+                options = ["--device", device, "--permit", "--json", "--seconds", "1"]
+                status, out, err = run("inject", *words.split(), *options)
+                assert status == 0, err
+                assert {each["name"] for each in json.loads(out)["found"]} == {name}, "and nothing of before"
+            with bs.connect(device) as skin:
+                assert skin.faults() == {}
+                assert skin.health().board_faults == ()
+        finally:
+            server.send_signal(signal.SIGINT)
+            server.communicate(timeout=20)

@@ -86,6 +86,16 @@ SEQUENCE += (
     *["STATE"] * 10,
     "SEQUENCE_CONTROL end",
 )
+INJECTING = (
+    "VENT",
+    "INJECT permit",
+    "INJECT stuck",
+    "INJECT open",
+    "SHOW up",
+    "INJECT shut",
+    "INJECT permit",
+    "INJECT mend",
+)
 EXTREMES = tuple(f"{name} {end}" for name in ("all", "repeated") for end in ("least", "greatest"))
 """Every request with its fields at the ends of what the wire can say: `all` of them, or only what is repeated."""
 
@@ -106,6 +116,7 @@ SEQUENCES = [
     pytest.param(("SETTING_WRITE", "SHOW up", "PING", "long silence", "STATE"), id="deadman"),
     pytest.param(("SHOW up", "bad CRC", "bad table", "bad CRC", "VENT", "STORE_RESET", "too large"), id="hostile"),
     pytest.param(RESETS, id="resets and commits"),
+    pytest.param(INJECTING, id="failures on request"),
     *[pytest.param((name, "SHOW up", "VENT"), id=name, marks=pytest.mark.slow) for name in EXTREMES],
 ]
 FAILING = 500
@@ -155,6 +166,11 @@ def request(name, n, number, session):
         "bad table": lambda: of("TABLE_WRITE", (n - 1, 0, 60), [(9000, 65535)] * 40),
         "too large": lambda: of("FAULTS_ACK", (0x7FFFFFFF,)),
         "HELLO 9": lambda: of("HELLO", (9, 9, session)),
+        "INJECT permit": lambda: of("INJECT", (0, 0, 1)),
+        "INJECT stuck": lambda: of("INJECT", (2, n - 1, 1)),
+        "INJECT open": lambda: of("INJECT", (5, 1, 1)),
+        "INJECT shut": lambda: of("INJECT", (4, 2, 1)),
+        "INJECT mend": lambda: of("INJECT", (2, n - 1, 0)),
         "SEQUENCE_BEGIN": lambda: of("SEQUENCE_BEGIN", (3, n, 0, 5, program_crc(n))),
         "SEQUENCE_WRITE": lambda: of("SEQUENCE_WRITE", (3, 0), program(n)),
         "SEQUENCE_ARM": lambda: of("SEQUENCE_ARM", (3,)),

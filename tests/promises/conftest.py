@@ -40,6 +40,10 @@ CLEAR_TICKS = 3
 SESSION = 4711
 
 
+INJECTION, ON_REQUEST = 0, range(1, 9)
+"""What INJECT makes fail, and the permission for it."""
+OF_THE_SENSOR, OF_THE_SUPPLY = (1, 2, 3), (6, 7, 8)
+
 SUBTLE = ("supply_bias", "supply_flat")
 
 
@@ -61,6 +65,7 @@ class World:
         self.matched = not spread
         self.host = host or (lambda firmware: None)
         self.failing = {}  # value by (failure, bubble)
+        self.asked_for = set()  # (number of the failure, bubble), by INJECT
         self.ill = set()  # bubbles that ever were: a sensor that was off leaves wrong estimates
         self.telling = True
         self.pressed = False
@@ -97,6 +102,22 @@ class World:
         self.send("CLEAR")
         if self.telling:
             self.clearing = CLEAR_TICKS
+
+    def permit_failures(self, permitted):
+        """Let the firmware do to itself what the host asks for, which wants everything vented; or no more."""
+        self.send("INJECT", (INJECTION, 0, permitted))
+        if not permitted:
+            self.asked_for.clear()
+
+    def ask_for(self, failure, bubble):
+        """The firmware is to make a part of itself fail; the bubbles that it could be are ill, whether it does or not."""
+        self.send("INJECT", (failure, bubble, 1))
+        self.asked_for.add((failure, bubble))
+        self.lost[bubble] |= self.is_lost(bubble)
+        if failure in OF_THE_SUPPLY:
+            self.supply_is_ill = True
+        else:
+            self.ill.add(bubble)
 
     def fall_silent(self):
         self.telling = False
@@ -136,6 +157,7 @@ class World:
         if not first:
             self.board.reset()
         self.host(self.board.firmware.app)
+        self.asked_for.clear()
         self.faults = (0,) * self.bubbles
         self.unacknowledged = set()  # bubbles with a fault of which nobody has heard
         self.clearing = 0
@@ -196,7 +218,8 @@ class World:
         failing = self.failing
         comes_in = failing.get(("fill_stuck", bubble), 0.0) > 0.0
         stays_in = failing.get(("vent_stuck", bubble), 0.0) < 0.0
-        return comes_in and stays_in and (("sensor_stuck", bubble) in failing or ("sensor_absent", bubble) in failing)
+        blind = ("sensor_stuck", bubble) in failing or ("sensor_absent", bubble) in failing
+        return comes_in and stays_in and (blind or any((number, bubble) in self.asked_for for number in OF_THE_SENSOR))
 
     def judge_height(self, height_mm):
         """True heights of bubbles that nobody lifts, on rubber as the tables have it."""
@@ -313,6 +336,18 @@ class Promises(RuleBasedStateMachine):
     @rule(failure=st.sampled_from(SUPPLY_FAILURES), duration=_durations)
     def fail_supply(self, failure, duration):
         self.world.inject_supply(*failure)
+        self.world.run(duration)
+
+    @rule(permitted=st.sampled_from([1, 1, 1, 0]), duration=st.sampled_from([0.02, 0.3]))
+    def permit_failures(self, permitted, duration):
+        if permitted:
+            self.world.vent()
+        self.world.permit_failures(permitted)
+        self.world.run(duration)
+
+    @rule(failure=st.sampled_from(ON_REQUEST), bubble=st.integers(0, 6), duration=_durations)
+    def fail_on_request(self, failure, bubble, duration):
+        self.world.ask_for(failure, bubble)
         self.world.run(duration)
 
     @rule()

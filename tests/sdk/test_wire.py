@@ -235,7 +235,7 @@ def test_every_error_of_the_schema_is_explained():
     explained |= {errors.BOARD_FAULT, errors.OVERTAKEN, errors.WRONG_BOARD, errors.BAD_STEP, errors.BAD_LOOP}
     explained |= {errors.OUT_OF_ORDER, errors.NO_ROOM, errors.NOT_READY, errors.TOO_LATE}
     explained |= {errors.NOT_VENTED, errors.STORE_FOREIGN, errors.STORE_FAILED}
-    explained |= {errors.NO_SETTING}
+    explained |= {errors.NO_SETTING, errors.NOT_PERMITTED}
     assert explained == {code for code, _, _ in errors.ERRORS}
 
 

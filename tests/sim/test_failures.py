@@ -1,5 +1,6 @@
 """The vocabulary of injected failures: what each of them does to the plant, what cannot be meant, and that it can be mended."""
 
+import contextlib
 import json
 
 import numpy as np
@@ -206,10 +207,115 @@ def test_what_cannot_be_meant_says_what_can(words, said):
         skin.inject(*words)
 
 
-def test_a_real_board_is_not_made_to_fail():
-    skin = bs.Skin(run_sync(AsyncSkin.open(SimulatedTransport(SimulatedBoard(), "/dev/ttyACM0"), 2.0)))
-    with skin, pytest.raises(bs.InvalidInput, match="is no simulated board"):
-        skin.inject("sensor", 3, "stuck")
+@pytest.fixture
+def real():
+    """A skin that takes its board for a real one, and the board."""
+    board = SimulatedBoard("wristband7", contact=False)
+    with bs.Skin(run_sync(AsyncSkin.open(SimulatedTransport(board, "/dev/ttyACM0"), 2.0))) as skin:
+        yield skin, board
+
+
+def test_a_real_board_fails_only_once_that_is_permitted(real):
+    skin, _ = real
+    with pytest.raises(bs.DeviceRefused, match="permit_injection"):
+        skin.inject("sensor", 3, "missing")
+    skin.show([6.0] * 7)
+    with pytest.raises(bs.DeviceRefused, match="not vented"):
+        skin.permit_injection()
+    with pytest.raises(bs.InvalidInput, match="True or False"):
+        skin.permit_injection("yes")
+    assert skin.faults() == {}
+
+
+ON_ITS_OWN = [
+    ("sensor", "off", {"sensor_lost"}),
+    ("sensor", "missing", {"sensor_lost"}),
+    ("sensor", "stuck", {"sensor_stuck"}),
+    ("fill valve", "off", {"no_air"}),
+    ("fill valve", "missing", {"no_air"}),
+    ("vent valve", "off", {"leak", "no_air"}),
+    ("vent valve", "missing", {"leak", "no_air"}),
+]
+
+
+@pytest.mark.parametrize(("part", "how", "names"), ON_ITS_OWN)
+def test_a_real_board_finds_what_it_does_to_itself(real, part, how, names):
+    skin, board = real
+    skin.permit_injection()
+    skin.show([8.0] * 7)
+    skin.inject(part, 3, how)
+    skin.show([10.0] * 7, wait=False)
+    skin.sleep(1.5)
+    assert list(skin.faults()) == [3]
+    assert set(skin.faults()[3]) & names
+    assert board.plant.height_mm[3] < 10.2
+    skin.inject(part, 3, "healthy")
+    skin.vent()
+    skin.sleep(1.5)
+    skin.clear_faults()
+    assert skin.show([8.0] * 7).settled
+
+
+def test_a_real_board_with_a_sensor_that_says_too_much_stands_lower(real):
+    skin, board = real
+    skin.permit_injection()
+    skin.show([7.0] * 7, plan=False)
+    skin.inject("sensor", 3, "wrong")
+    skin.show([12.0] * 7, wait=False, plan=False)
+    skin.sleep(1.0)
+    assert board.plant.height_mm[3] < 12.1
+    assert board.plant.height_mm[2] == pytest.approx(12.0, abs=0.2)
+
+
+def test_the_supply_of_a_real_board_fails_and_is_mended(real):
+    skin, _ = real
+    skin.permit_injection()
+    for part, how in (("supply", "missing"), ("supply", "off"), ("pump", "off"), ("pump", "missing")):
+        skin.show([8.0] * 7)
+        skin.inject(part, 0, how)
+        for _ in range(100):
+            with contextlib.suppress(bs.DeviceRefused):
+                skin.show([12.0] * 7, wait=False)
+                skin.sleep(0.3)
+                skin.show([6.0] * 7, wait=False)
+            skin.sleep(0.3)
+            if "supply_lost" in skin.health().board_faults:
+                break
+        assert "supply_lost" in skin.health().board_faults, (part, how)
+        skin.inject(part, 0, "healthy")
+        skin.sleep(5.0)
+        skin.clear_faults()
+
+
+def test_permission_ends_with_a_restart_and_on_request(real):
+    skin, _ = real
+    skin.permit_injection()
+    skin.inject("sensor", 3, "missing")
+    skin.permit_injection(False)
+    with pytest.raises(bs.DeviceRefused, match="permit_injection"):
+        skin.inject("sensor", 3, "missing")
+    skin.permit_injection()
+    skin.restart()
+    with pytest.raises(bs.DeviceRefused, match="permit_injection"):
+        skin.inject("sensor", 3, "missing")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("fill valve", 3, "stuck"), "it can make it off, missing, and healthy again"),
+        (("vent valve", 3, "stuck"), "it can make it off, missing"),
+        (("tube", 3, "off"), "simulated"),
+        (("link", 0, "off"), "sim://"),
+        (("sensor", 7, "missing"), "0 to 6"),
+        (("sensor", 3, "green"), "it can be off, stuck"),
+        (("sensor", 3, 5), "5"),
+        (("teapot", 3, "off"), "give one of"),
+    ],
+)
+def test_what_a_real_board_cannot_do_says_what_it_can(real, words, said):
+    with pytest.raises(bs.InvalidInput, match=said):
+        real[0].inject(*words)
 
 
 def test_the_words_with_values_go_on():

@@ -11,6 +11,7 @@ import generated
 
 from bubble_protocol import codec
 from bubble_protocol.schema.messages import FIRST_SIZES, MESSAGES
+from bubble_protocol.schema.settings import SETTINGS
 
 PATH = Path("protocol/bubble_protocol/schema/packed.py")
 
@@ -40,7 +41,10 @@ def text() -> str:
             row.append(limits)
         values = ", ".join(_bytes(value) if isinstance(value, bytes) else repr(value) for value in row)
         parts.append(f"    ({values}),  # {name}\n")
-    return "".join(parts) + ")\n"
+    parts.append(
+        f")\n\n# (least, most, default) of each setting; None: the board's\nSETTINGS = {tuple(row[3:6] for row in SETTINGS)}\n"
+    )
+    return "".join(parts)
 
 
 def _bytes(kinds: bytes) -> str:

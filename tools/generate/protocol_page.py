@@ -10,7 +10,18 @@ from pathlib import Path
 import generated
 
 from bubble_protocol import codec, frame, steps, version
-from bubble_protocol.schema import errors, faults, messages, modes, sequences, statuses, store, system, telemetry
+from bubble_protocol.schema import (
+    errors,
+    faults,
+    injection,
+    messages,
+    modes,
+    sequences,
+    statuses,
+    store,
+    system,
+    telemetry,
+)
 from bubbleskin.link.message import SCHEMA_CRC, encode, session_key
 
 PATH = Path("docs/protocol.md")
@@ -216,7 +227,11 @@ def page() -> str:
     parts += ["## Faults of a bubble\n", "Bits; they stay until CLEAR.\n", enumeration(faults.FAULTS, "bit")]
     parts += ["## Store\n", "Where what is in use comes from:\n", enumeration(store.SOURCES, "store")]
     parts += ["What one of its slots holds:\n", enumeration(store.SLOTS, "slot")]
-    parts += ["## Capabilities\n", "Bits.\n", enumeration(system.CAPABILITIES, "bit")]
+    parts += [
+        "## Injections\n",
+        "Failures on purpose, by INJECT. The first permits the others: while all is vented, and until the next start.\n",
+        enumeration(injection.INJECTIONS, "failure"),
+    ]
     parts += ["## Sequence state\n", enumeration(sequences.STATES, "state")]
     parts += ["## Sequence reason\n", enumeration(sequences.REASONS, "reason")]
     parts += ["## Sequence event\n", enumeration(sequences.EVENTS, "event")]

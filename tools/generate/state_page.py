@@ -8,11 +8,25 @@ from pathlib import Path
 
 import generated
 
-from bubble_firmware.safety.state import EVENTS, SafetyState
+from bubble_firmware.safety import state
 from bubble_protocol.schema import modes
 
 PATH = Path("docs/safety.md")
 BEGIN, END = "<!-- states: made by tools/generate/state_page.py -->\n", "<!-- end of states -->\n"
+
+EVENTS = (
+    (state.TESTED, "self-test over"),
+    (state.SHOW, "SHOW"),
+    (state.STOP, "STOP"),
+    (state.VENT, "VENT"),
+    (state.DEPRESSURISED, "no pressure left"),
+    (state.HOST_QUIET, "host silent, moving"),
+    (state.HOST_SILENT, "host silent for long"),
+    (state.EXCEPTION, "exception"),
+    (state.BOARD_FAULT, "fault of the board"),
+    (state.ESTOP, "emergency stop"),
+    (state.CLEAR, "CLEAR"),
+)
 
 NAMES = {number: name for number, name, _ in modes.MODES}
 
@@ -22,10 +36,10 @@ def changes() -> dict[tuple[int, int], list[str]]:
     found: dict[tuple[int, int], list[str]] = {}
     for event, text in EVENTS:
         for mode in NAMES:
-            state = SafetyState.__new__(SafetyState)
-            state.mode = mode
-            if state.handle(event):
-                found.setdefault((mode, state.mode), []).append(text)
+            board = state.SafetyState.__new__(state.SafetyState)
+            board.mode = mode
+            if board.handle(event):
+                found.setdefault((mode, board.mode), []).append(text)
     return found
 
 
@@ -39,9 +53,9 @@ def drawing() -> str:
     for number, name, meaning in modes.MODES:
         cells = []
         for event, _ in EVENTS:
-            state = SafetyState.__new__(SafetyState)
-            state.mode = number
-            cells.append(NAMES[state.mode] if state.handle(event) else "")
+            board = state.SafetyState.__new__(state.SafetyState)
+            board.mode = number
+            cells.append(NAMES[board.mode] if board.handle(event) else "")
         lines.append(f"| **{name}** | {meaning} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

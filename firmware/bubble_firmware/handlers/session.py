@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # [constants] message PING_REPLY as PING: *
 # [constants] message SUBSCRIBE as SUBSCRIBE: *
 # [constants] message SUBSCRIBE_FIELDS as CHOSEN: *
-_SCHEMA_CRC = const(-67365510)
+_SCHEMA_CRC = const(-439127705)
 _HELLO = const(1)
 _PING = const(2)
 _SUBSCRIBE = const(6)

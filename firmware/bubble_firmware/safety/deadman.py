@@ -4,12 +4,19 @@ A host that lives says so; what moves while nobody speaks is held after one time
 another. Both are settings.
 """
 
-from bubble_firmware.safety.state import HOST_QUIET, HOST_SILENT, NO_EVENT
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
-from bubble_protocol.schema.modes import ACTIVE, HOLDING
 
 if TYPE_CHECKING:
     from types import ModuleType
+
+# [constants] bubble_protocol.schema.modes: ACTIVE HOLDING
+# [constants] bubble_firmware.safety.state: HOST_QUIET HOST_SILENT NO_EVENT
+_ACTIVE = const(1)
+_HOLDING = const(2)
+_HOST_QUIET = const(5)
+_HOST_SILENT = const(6)
+_NO_EVENT = const(-1)
+# [end of constants]
 
 _SILENT_MAX = const(1 << 24)  # ticks of silence counted
 
@@ -37,13 +44,13 @@ class Deadman:
         silent = self.silent_ticks
         if silent < _SILENT_MAX:
             self.silent_ticks = silent = silent + 1
-        if mode != ACTIVE and mode != HOLDING:
-            return NO_EVENT
+        if mode != _ACTIVE and mode != _HOLDING:
+            return _NO_EVENT
         if silent >= self._vent_ticks:
-            return HOST_SILENT
-        if moving and mode == ACTIVE and silent >= self._hold_ticks:
-            return HOST_QUIET
-        return NO_EVENT
+            return _HOST_SILENT
+        if moving and mode == _ACTIVE and silent >= self._hold_ticks:
+            return _HOST_QUIET
+        return _NO_EVENT
 
     def _ticks(self, ms: int) -> int:
         """Whole ticks, at least one."""

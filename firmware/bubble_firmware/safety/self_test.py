@@ -9,7 +9,6 @@ and an emergency stop end the test.
 from array import array
 
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
-from bubble_protocol.schema.self_test import FAILED, NOT_RUN, PASSED, RUNNING, SKIPPED
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -18,7 +17,13 @@ if TYPE_CHECKING:
     from bubble_firmware.control.supply import Supply
 
 # [constants] bubble_firmware.control.trim: used
+# [constants] bubble_protocol.schema.self_test: FAILED NOT_RUN PASSED RUNNING SKIPPED
 _ZERO_PA = const(1500)
+_FAILED = const(3)
+_NOT_RUN = const(0)
+_PASSED = const(2)
+_RUNNING = const(1)
+_SKIPPED = const(4)
 # [end of constants]
 
 _PULSE_US = const(3000)
@@ -41,7 +46,7 @@ class SelfTest:
     """`outcome` of the test and, as bits, the bubbles that are ill; `tick` changes the pulses while `running`."""
 
     def __init__(self, board: "ModuleType", wanted: bool):
-        self.outcome = RUNNING if wanted else NOT_RUN
+        self.outcome = _RUNNING if wanted else _NOT_RUN
         self.untrue_zero = 0
         self.unfilled = 0
         self.unvented = 0
@@ -56,12 +61,12 @@ class SelfTest:
     @property
     def failed(self) -> bool:
         """Whether something was found."""
-        return self.outcome == FAILED
+        return self.outcome == _FAILED
 
     def skip(self) -> None:
         """End the test with what is known."""
         if self.running:
-            self._end(SKIPPED)
+            self._end(_SKIPPED)
 
     def tick(self, bubbles: "Bubbles", supply: "Supply") -> None:
         """One period of the test, after control has filled in `bubbles.pulses`."""
@@ -76,7 +81,7 @@ class SelfTest:
                 self._apply_pulse(bubbles, self._pulse_us)
                 self._next(_HOLD)
             elif self._time >= _WAIT_US:
-                self._end(SKIPPED)
+                self._end(_SKIPPED)
         elif stage == _HOLD:
             self._apply_pulse(bubbles, 0)
             if self._time >= _HOLD_US:
@@ -84,7 +89,7 @@ class SelfTest:
                 self._next(_RELEASE)
         elif self._time >= _RELEASE_US:
             self.unvented = self._take_fall(bubbles)
-            self._end(PASSED)
+            self._end(_PASSED)
 
     def _next(self, stage: int) -> None:
         self._stage = stage
@@ -94,7 +99,7 @@ class SelfTest:
         self._stage = _OFF
         self.running = False
         ill = self.untrue_zero | self.unfilled | self.unvented
-        self.outcome = FAILED if ill else outcome
+        self.outcome = _FAILED if ill else outcome
 
     def _apply_pulse(self, bubbles: "Bubbles", fill_us: int) -> None:
         pulses = bubbles.pulses

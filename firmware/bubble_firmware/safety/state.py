@@ -5,31 +5,27 @@ gets demands. docs/safety.md has the drawing, made from this table.
 """
 
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
-from bubble_protocol.schema.modes import ACTIVE, BOOT, FAULTED, HOLDING, IDLE, STOPPED, VENTING
 
 if TYPE_CHECKING:
     from types import ModuleType
 
+# [constants] bubble_protocol.schema.modes: ACTIVE BOOT FAULTED HOLDING IDLE STOPPED VENTING
+_ACTIVE = const(1)
+_BOOT = const(3)
+_FAULTED = const(5)
+_HOLDING = const(2)
+_IDLE = const(0)
+_STOPPED = const(6)
+_VENTING = const(4)
+# [end of constants]
+
 # Events.
 NO_EVENT = -1
 TESTED, SHOW, STOP, VENT, DEPRESSURISED, HOST_QUIET, HOST_SILENT, EXCEPTION, BOARD_FAULT, ESTOP, CLEAR = range(11)
-EVENTS = (
-    (TESTED, "self-test over"),
-    (SHOW, "SHOW"),
-    (STOP, "STOP"),
-    (VENT, "VENT"),
-    (DEPRESSURISED, "no pressure left"),
-    (HOST_QUIET, "host silent, moving"),
-    (HOST_SILENT, "host silent for long"),
-    (EXCEPTION, "exception"),
-    (BOARD_FAULT, "fault of the board"),
-    (ESTOP, "emergency stop"),
-    (CLEAR, "CLEAR"),
-)
 
 STATES = const(7)
 # For each event, the state that follows IDLE, ACTIVE, HOLDING, BOOT, VENTING, FAULTED, STOPPED.
-_I, _A, _H, _B, _V, _F, _S = IDLE, ACTIVE, HOLDING, BOOT, VENTING, FAULTED, STOPPED
+_I, _A, _H, _B, _V, _F, _S = _IDLE, _ACTIVE, _HOLDING, _BOOT, _VENTING, _FAULTED, _STOPPED
 _TABLE = bytes(
     (_I, _A, _H, _I, _V, _F, _S)  # TESTED
     + (_A, _A, _A, _A, _A, _F, _S)  # SHOW
@@ -53,7 +49,7 @@ class SafetyState:
     """`mode` is the state of the board, one of MODES; `handle` changes it."""
 
     def __init__(self, board: "ModuleType"):
-        self.mode = BOOT
+        self.mode = _BOOT
         self._venting_max = _VENTING_US // board.TICK_US
         self._venting_ticks = 0
 
@@ -73,7 +69,7 @@ class SafetyState:
 
     def update_venting(self, pressed: int) -> None:
         """One tick on the way to IDLE: there, when no bubble is `pressed` any longer or it has taken too long."""
-        if self.mode == VENTING:
+        if self.mode == _VENTING:
             self._venting_ticks += 1
             if not pressed or self._venting_ticks >= self._venting_max:
                 self.handle(DEPRESSURISED)

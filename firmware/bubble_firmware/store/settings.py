@@ -3,7 +3,7 @@
 from array import array
 
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
-from bubble_protocol.schema.settings import SETTINGS
+from bubble_protocol.schema.packed import SETTINGS
 from bubble_protocol.steps import small_word
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Settings:
         self.lows = array("i")
         self.highs = array("i")
         self.version = 0
-        for _, _, _, low, high, default, _ in SETTINGS:
+        for low, high, default in SETTINGS:
             most: int = board.BUDGET_KPA_S if high is None else high
             self.lows.append(low)
             self.highs.append(most)

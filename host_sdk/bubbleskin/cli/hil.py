@@ -32,12 +32,21 @@ _NEEDED = ("pytest", "pytest_timeout", "pytest_html")
     "--html", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Write a report to look at."
 )
 @click.option("--junit", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Write JUnit XML.")
+@click.option(
+    "--permit-failures",
+    "failures",
+    is_flag=True,
+    help="On a real wristband too, let parts of it fail on purpose, such as a sensor: nobody may wear it.",
+)
 @click.option("--list", "names", is_flag=True, help="Say what would be tried, and touch nothing.")
-def hil(devices: tuple[str, ...], only: str | None, html: Path | None, junit: Path | None, names: bool) -> NoReturn:
+def hil(
+    devices: tuple[str, ...], only: str | None, html: Path | None, junit: Path | None, failures: bool, names: bool
+) -> NoReturn:
     """Try on a device what docs/safety.md, link.md, store.md and control.md promise.
 
-    A board that has never moved is asked for little at first, and for no more where that fails. What would need a
-    failure is tried on simulated targets only, and said. Status 0: all of it holds; 1: something does not.
+    A board that has never moved is asked for little at first, and for no more where that fails. What needs a
+    failure is tried on simulated targets, and on a real one with --permit-failures, as far as it can fail on purpose; the
+    rest is said. Status 0: all of it holds; 1: something does not.
     """
     if missing():
         raise BubbleskinError(f"`bubbleskin hil` needs {', '.join(missing())}: {INSTALL}")
@@ -59,6 +68,7 @@ def hil(devices: tuple[str, ...], only: str | None, html: Path | None, junit: Pa
     arguments += ["-k", only] if only else []
     arguments += [f"--html={html}", "--self-contained-html"] if html else []
     arguments += [f"--junit-xml={junit}"] if junit else []
+    arguments += ["--permit-failures"] if failures else []
     arguments += ["--collect-only", "-q"] if names else []
     raise SystemExit(pytest.main(arguments))
 

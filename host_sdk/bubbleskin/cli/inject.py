@@ -1,8 +1,8 @@
-"""`bubbleskin inject`: make a part of a simulated board fail, and see what the firmware makes of it."""
+"""`bubbleskin inject`: make a part of a board fail, and see what the firmware makes of it."""
 
 import contextlib
 import json as jsonlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _EVERY_S = 0.02
 _MOVE_MM = 2.0
+_FLAT_S = 1.5
 
 
 @click.command()
@@ -32,9 +33,12 @@ _MOVE_MM = 2.0
 )
 @click.option("--seconds", type=Real(0.1, 60.0, "s"), default=3.0, show_default=True, help="How long the firmware has.")
 @click.option("--list", "listed", is_flag=True, help="Print what can fail in which ways, and do nothing else.")
+@click.option("--permit", is_flag=True, help="Let a real board do it to itself, which nobody may wear then.")
 @as_json
-def inject(words: tuple[str, ...], device: str, height: float, seconds: float, listed: bool, json: bool) -> None:
-    """Make a part of a simulated board fail, and say what its firmware finds, when, and what it says to do.
+def inject(
+    words: tuple[str, ...], device: str, height: float, seconds: float, listed: bool, permit: bool, json: bool
+) -> None:
+    """Make a part of a board fail, and say what its firmware finds, when, and what it says to do.
 
     For example: `bubbleskin inject sensor 3 stuck`. All bubbles stand at --height before; after the failure they rise by 2 mm
     and come down, because some failures are felt in a move only.
@@ -45,7 +49,7 @@ def inject(words: tuple[str, ...], device: str, height: float, seconds: float, l
         _print_table(json, [(failure.part, failure.how, failure.meaning) for failure in TABLE])
         return
     part, number, how = _meant(words)
-    with connect(device) as skin:
+    with connect(device) as skin, _permitted(skin, permit):
         skin.show([height] * skin.info.bubbles)
         found = _watched(skin, lambda: skin.inject(part, number, how), height, seconds)
     if json:
@@ -74,11 +78,34 @@ def _meant(words: tuple[str, ...]) -> tuple[str, int, str]:
     return part, int(number or 0), how
 
 
+@contextlib.contextmanager
+def _permitted(skin: "Skin", permit: bool) -> Iterator[None]:
+    """A real board needs permission, and loses it in the end."""
+    if skin.simulated is not None:
+        yield
+        return
+    if not permit:
+        raise InvalidInput(
+            f"{skin.link.transport.name} is a real board: with --permit it makes a part of itself fail, while nobody wears it."
+        )
+    skin.vent()
+    skin.permit_injection()
+    try:
+        yield
+    finally:
+        with contextlib.suppress(LinkError, DeviceRefused):
+            skin.permit_injection(False)
+            skin.vent()
+            skin.sleep(_FLAT_S)
+            skin.clear_faults()
+
+
 def _watched(skin: "Skin", fail: Callable[[], None], height: float, seconds: float) -> list[dict[str, Any]]:
     """What the fault log gets, and where the wristband is not heard any more, that.
 
     All bubbles rise and come down meanwhile: some failures are felt in a move only.
     """
+    known = {fault.id for fault in skin.fault_log()}
     begin, top = skin.link.transport.now(), skin.info.height_max_mm
     booted = skin.state().time - begin
     moves = [(0.5, min(height + _MOVE_MM, top)), (0.5 + seconds / 3, max(height - _MOVE_MM, 0.0))]
@@ -91,6 +118,8 @@ def _watched(skin: "Skin", fail: Callable[[], None], height: float, seconds: flo
                     skin.show([moves.pop(0)[1]] * skin.info.bubbles, wait=False)
             skin.sleep(_EVERY_S)
             for fault in skin.fault_log():
+                if fault.id in known:
+                    continue
                 at = max(fault.time - booted - begin, 0.0)
                 said = f"{fault.name} of {fault.where}: {fault.meaning}. {fault.remedy}."
                 found.setdefault(

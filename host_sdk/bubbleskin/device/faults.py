@@ -69,6 +69,12 @@ class Fault:
         )
 
 
+async def acknowledged(link: Link, tick: float, request: str, fields: tuple[int, ...] = ()) -> float:
+    """Acknowledge by CLEAR or FAULTS_ACK: seconds until what it was has been isolated for long enough; `tick`: s."""
+    left_ms = (await link.call(request, fields))["isolated_ms"]
+    return left_ms * 1e-3 + tick if left_ms else 0.0
+
+
 async def read_log(link: Link, tick: float) -> list[Fault]:
     """All entries that a device has, oldest first; `tick`: its period, s."""
     found: list[Fault] = []

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from bubble_protocol import codec, frame
 from bubbleskin.checks import finite
+from bubbleskin.device.info import Info
 from bubbleskin.errors import InvalidInput
+from bubbleskin.link.link import Link
 from bubbleskin.link.message import Message
 
 APART_MOST = 1.3
@@ -18,7 +20,7 @@ APART_MOST = 1.3
 _Integers = NDArray[np.int64]
 
 _WIRE = codec.BY_NAME["CALIBRATION_WRITE"]
-ROWS_MOST = (frame.PAYLOAD_MAX - _WIRE.fixed_size) // _WIRE.stride
+_ROWS_MOST = (frame.PAYLOAD_MAX - _WIRE.fixed_size) // _WIRE.stride
 """How many bubbles one message has room for."""
 _VENT = "vent_"  # before the names of what the vent valve has apart
 _SHORT = ("zero", "opens_us", "closes_us", "flow_gain")  # what older firmware knows: both valves alike
@@ -124,3 +126,25 @@ def _check_flows(name: str, values: _Integers) -> None:
 def _range(values: _Integers) -> str:
     low, high = np.min(values), np.max(values)
     return f"{low}" if low == high else f"{low} to {high}"
+
+
+async def read(link: Link, info: Info) -> Trim:
+    """What a device uses."""
+    if not info.tells_sd:
+        return Trim.of([await link.call("TRIM_READ")])
+    replies: list[Message] = []
+    while (first := sum(len(reply.columns["zero"]) for reply in replies)) < info.bubbles:
+        replies.append(await link.call("CALIBRATION_READ", (first,)))
+    return Trim.of(replies)
+
+
+async def write(link: Link, info: Info, trim: Trim, anyway: bool) -> None:
+    """Let it use `trim`; unless `anyway`, only where its figures go together. Raises `InvalidInput`."""
+    rows = trim.rows(await read(link, info)) if info.tells_sd else trim.short_rows(info.bubbles)
+    if not anyway:
+        check(trim)
+    if not info.tells_sd:
+        await link.call("TRIM_WRITE", (), rows)
+        return
+    for first in range(0, len(rows), _ROWS_MOST):
+        await link.call("CALIBRATION_WRITE", (first,), rows[first : first + _ROWS_MOST])

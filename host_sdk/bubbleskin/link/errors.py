@@ -4,7 +4,7 @@ from typing import TypeVar
 
 from bubble_protocol.schema import errors
 from bubble_protocol.version import PROTOCOL_MAX, PROTOCOL_MIN
-from bubbleskin.errors import DeviceRestarted, DeviceSilent, InvalidInput, LinkError, WrongDevice
+from bubbleskin.errors import DeviceRestarted, DeviceSilent, LinkError, WrongDevice
 from bubbleskin.link.message import Message
 from bubbleskin.link.refusals import describe_refusal
 from bubbleskin.link.send_window import Request
@@ -74,13 +74,6 @@ def turned_away(problem: LinkError, name: str, said: str) -> LinkError:
     if not said or isinstance(problem, WrongDevice):
         return problem
     return LinkError(f"What is at {name} has ended the connection. It says: {said}")
-
-
-def not_simulated(name: str) -> InvalidInput:
-    """Of failures that somebody wants to have on the line `name`."""
-    return InvalidInput(
-        f"{name} is no simulated board, and only those can be made to fail: connect to sim://, micropython:// or rp2040://."
-    )
 
 
 def version(low: int, high: int) -> str:

@@ -68,6 +68,10 @@ def _not_ready(error: Message) -> str:
 _SENTENCES: dict[int, Callable[[Message], str]] = {
     errors.OUT_OF_RANGE: _out_of_range,
     errors.NOT_VENTED: _not_vented,
+    errors.NOT_PERMITTED: lambda error: (
+        "The wristband makes nothing fail on purpose before that is permitted, anew after each start: call "
+        "`permit_injection()` first."
+    ),
     errors.BAD_TABLE: lambda error: (
         f"The wristband refused the table of bubble {error['element']} at knot {error['asked']}: heights must rise to the "
         f"board's greatest height, where pressure may be {error['low']} Pa (more, and it would take more air than a bubble "

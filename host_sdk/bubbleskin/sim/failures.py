@@ -7,6 +7,8 @@ and `rp2040://`, because plant and line behind them are the same.
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NoReturn, Protocol
 
+from bubble_protocol.schema import injection
+from bubbleskin import checks
 from bubbleskin.checks import shown
 from bubbleskin.errors import InvalidInput
 from bubbleskin.sim.impairment import Impairment
@@ -41,6 +43,8 @@ class Failure:
     """What the line does."""
     pace: float = 1.0
     """Seconds of the host's clock in one of the device's."""
+    board: int | None = None
+    """What INJECT calls it, where a real board can do it to itself: nothing that lets air in, or keeps it."""
 
 
 _BLINK = (0.02, 0.2)
@@ -48,17 +52,23 @@ LATE_S = 0.05
 """By how much a sensor is late that is slow or delayed."""
 
 TABLE = (
-    Failure("sensor", "off", "reads its pull-down, 0 counts", {"sensor_absent": 1.0}),
-    Failure("sensor", "stuck", "says for ever what it says now", {"sensor_stuck": 0.0}),
-    Failure("sensor", "wrong", "says 3 kPa too much", {"sensor_bias": 3e3}),
+    Failure("sensor", "off", "reads its pull-down, 0 counts", {"sensor_absent": 1.0}, board=injection.SENSOR_MISSING),
+    Failure("sensor", "stuck", "says for ever what it says now", {"sensor_stuck": 0.0}, board=injection.SENSOR_STUCK),
+    Failure("sensor", "wrong", "says 3 kPa too much", {"sensor_bias": 3e3}, board=injection.SENSOR_HIGH),
     Failure("sensor", "noisy", "1 kPa RMS of noise instead of 50 Pa", figures={"sensor_noise": 20.0}),
     Failure("sensor", "slow", "follows with a time constant of 50 ms", sensor="lag"),
     Failure("sensor", "delayed", "says what there was 50 ms ago", sensor="delay"),
     Failure(
         "sensor", "intermittent", "reads 0 counts for 20 ms, five times a second", {"sensor_absent": 1.0}, share=_BLINK
     ),
-    Failure("sensor", "missing", "as off: the input reads its pull-down", {"sensor_absent": 1.0}),
-    Failure("fill valve", "off", "has no current: stays shut", {"fill_stuck": -1.0}),
+    Failure(
+        "sensor",
+        "missing",
+        "as off: the input reads its pull-down",
+        {"sensor_absent": 1.0},
+        board=injection.SENSOR_MISSING,
+    ),
+    Failure("fill valve", "off", "has no current: stays shut", {"fill_stuck": -1.0}, board=injection.FILL_SHUT),
     Failure("fill valve", "stuck", "stays open", {"fill_stuck": 1.0}),
     Failure(
         "fill valve",
@@ -67,8 +77,8 @@ TABLE = (
         figures={"fill_opening": 3.0, "fill_closing": 3.0},
     ),
     Failure("fill valve", "intermittent", "stays shut for half of each 0.2 s", {"fill_stuck": -1.0}, share=(0.1, 0.2)),
-    Failure("fill valve", "missing", "as off: nothing lets air in", {"fill_stuck": -1.0}),
-    Failure("vent valve", "off", "has no current: stays open", {"vent_stuck": 1.0}),
+    Failure("fill valve", "missing", "as off: nothing lets air in", {"fill_stuck": -1.0}, board=injection.FILL_SHUT),
+    Failure("vent valve", "off", "has no current: stays open", {"vent_stuck": 1.0}, board=injection.VENT_OPEN),
     Failure("vent valve", "stuck", "stays shut", {"vent_stuck": -1.0}),
     Failure(
         "vent valve",
@@ -79,7 +89,7 @@ TABLE = (
     Failure(
         "vent valve", "intermittent", "stays open for 20 ms, five times a second", {"vent_stuck": 1.0}, share=_BLINK
     ),
-    Failure("vent valve", "missing", "as off: the line is open", {"vent_stuck": 1.0}),
+    Failure("vent valve", "missing", "as off: the line is open", {"vent_stuck": 1.0}, board=injection.VENT_OPEN),
     Failure("tube", "off", "has slipped off the bubble's barb: the line is open", {"pop_off": 1.0}),
     Failure("tube", "stuck", "blocked: a thousand times its resistance", figures={"tube_resistance": 1e3}),
     Failure("tube", "slow", "kinked: twenty times its resistance", figures={"tube_resistance": 20.0}),
@@ -93,6 +103,7 @@ TABLE = (
         "off",
         "the reservoir runs empty: no pump, and the dump valve open",
         {"pump_off": 1.0, "dump_stuck": 1.0},
+        board=injection.SUPPLY_EMPTY,
     ),
     Failure("supply", "stuck", "its sensor says for ever what it says now", {"supply_stuck": 0.0}),
     Failure("supply", "wrong", "its sensor says 8 kPa too little", {"supply_bias": -8e3}),
@@ -104,11 +115,17 @@ TABLE = (
         {"supply_absent": 1.0},
         share=_BLINK,
     ),
-    Failure("supply", "missing", "its sensor's input reads its pull-down", {"supply_absent": 1.0}),
-    Failure("pump", "off", "brings nothing", {"pump_off": 1.0}),
+    Failure(
+        "supply",
+        "missing",
+        "its sensor's input reads its pull-down",
+        {"supply_absent": 1.0},
+        board=injection.SUPPLY_MISSING,
+    ),
+    Failure("pump", "off", "brings nothing", {"pump_off": 1.0}, board=injection.PUMP_OFF),
     Failure("pump", "slow", "brings a tenth of its air", figures={"supply.pump_free_flow": 0.1}),
     Failure("pump", "intermittent", "brings nothing for one second of two", {"pump_off": 1.0}, share=(1.0, 2.0)),
-    Failure("pump", "missing", "as off: brings nothing", {"pump_off": 1.0}),
+    Failure("pump", "missing", "as off: brings nothing", {"pump_off": 1.0}, board=injection.PUMP_OFF),
     Failure("link", "off", "loses everything, both ways", line=Impairment(drop=1.0)),
     Failure("link", "noisy", "damages one frame in ten", line=Impairment(flip=0.1)),
     Failure("link", "delayed", "half of what comes is 30 ms late, and again", line=Impairment(stall=0.5, stall_s=0.03)),
@@ -141,6 +158,26 @@ def failure_of(part: str, how: object) -> Failure:
 def hows(part: str) -> list[str]:
     """The ways in which `part` can fail."""
     return [failure.how for failure in TABLE if failure.part == part]
+
+
+def on_board(part: str, number: int, how: object, bubbles: int) -> list[tuple[int, int, int]]:
+    """INJECTs that make a part of a real board with so many bubbles fail, or mend it. Raises `InvalidInput`."""
+    part = part_of(part)
+    number = checks.whole("number", number, 0, bubbles - 1) if part in OF_BUBBLES else 0
+    known = sorted({failure.board for failure in TABLE if failure.part == part and failure.board is not None})
+    mended = [(each, number, 0) for each in known]
+    if how == HEALTHY:
+        return mended
+    failure = failure_of(part, how)
+    if failure.board is None:
+        can = [failure.how for failure in TABLE if failure.part == part and failure.board is not None]
+        own = (
+            f"make a {part} {failure.how}; it can make it {', '.join(can)}, and {HEALTHY} again"
+            if can
+            else f"make a {part} fail"
+        )
+        raise InvalidInput(f"A real board cannot {own}. Simulated ones can: sim://, micropython:// or rp2040://.")
+    return [*mended, (failure.board, number, 1)]
 
 
 def _refuse(part: str, how: object) -> NoReturn:

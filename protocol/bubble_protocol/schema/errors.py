@@ -3,7 +3,7 @@
 # What ERROR says went wrong.
 UNKNOWN_MESSAGE, WRONG_LENGTH, OUT_OF_RANGE, WRONG_COUNT, BAD_TABLE, BAD_CRC, NO_COMMON_PROTOCOL, FAULTED = range(1, 9)
 BOARD_FAULT, OVERTAKEN = 9, 10
-NO_SETTING = 12
+NO_SETTING, NOT_PERMITTED = 12, 13
 NOT_VENTED, STORE_FOREIGN, STORE_FAILED = 15, 16, 17
 WRONG_BOARD, BAD_STEP, BAD_LOOP, OUT_OF_ORDER, NO_ROOM, NOT_READY, TOO_LATE = range(18, 25)
 NO_ELEMENT = 255  # in place of a repetition's number: it is about none
@@ -25,6 +25,11 @@ ERRORS = (
     (BOARD_FAULT, "board_fault", "a fault of the board forbids it: asked are its bits; mend the cause, then CLEAR"),
     (OVERTAKEN, "overtaken", "a later STOP, VENT or session came first: not applied, and never will be"),
     (NO_SETTING, "no_setting", "no setting has this number: asked; low to high exist"),
+    (
+        NOT_PERMITTED,
+        "not_permitted",
+        "nothing is made to fail on purpose before that is permitted: asked is the failure",
+    ),
     (NOT_VENTED, "not_vented", "allowed only while all bubbles are vented: asked is the mode; VENT first"),
     (
         STORE_FOREIGN,

@@ -55,6 +55,7 @@ SUBSCRIBE_FIELDS = const(0x1B)
 CALIBRATION_WRITE = const(0x1D)
 CALIBRATION_READ = const(0x1E)
 TELEMETRY_FIELDS = const(0x1C)
+INJECT = const(0x1F)
 FAULTS_READ = const(0x12)
 FAULTS_ACK = const(0x13)
 SETTING_READ = const(0x14)
@@ -576,6 +577,18 @@ MESSAGES = (
         ),
         "the centre of each bubble",
     ),
+    (
+        INJECT,
+        "INJECT",
+        (
+            ("failure", U8, "", 0, 8, "see injections"),
+            ("bubble", U8, "", None, None, "whose, where it is a bubble's"),
+            ("on", U8, "", 0, 1, "1: fails from now on; 0: mended"),
+        ),
+        (),
+        "fail, or be mended; refused until `injection` has been permitted, which wants everything vented",
+    ),
+    (INJECT | REPLY, "INJECT_REPLY", (_TICKS,), (), "so be it, from the next tick"),
 )
 
 # Bytes of messages that have had fields appended, as the oldest version that is still understood sends them.

@@ -4,7 +4,7 @@
 
 from bubble_protocol.mpy_compat import const
 
-SCHEMA_CRC = const(-67365510)  # of all ids, names, field names and kinds, as a signed word
+SCHEMA_CRC = const(-439127705)  # of all ids, names, field names and kinds, as a signed word
 
 # (id, kinds of the fixed fields, kinds of the repeated ones); where that is not all, the size as first sent or None; where
 # values have limits, the lowest and the highest of each
@@ -81,4 +81,9 @@ PACKED = (
     (158, b"\x01", b"\x02\x02\x02\x02\x02\x02\x02\x02\x02\x02"),  # CALIBRATION_READ_REPLY
     (16, b"", b""),  # LAYOUT
     (144, b"\x04\x04", b"\x84\x84"),  # LAYOUT_REPLY
+    (31, b"\x01\x01\x01", b"", None, ((0, None, 0), (8, None, 1))),  # INJECT
+    (159, b"\x04", b""),  # INJECT_REPLY
 )
+
+# (least, most, default) of each setting; None: the board's
+SETTINGS = ((50, 5000, 250), (100, 60000, 1000), (10, None, None), (60000, 110000, 101325), (0, 5000, 250))
