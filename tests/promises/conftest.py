@@ -92,32 +92,18 @@ class World:
     def show(self, heights_um, ramp_ms):
         self.send("SHOW", (ramp_ms,), [(int(height),) for height in heights_um])
 
-    def stop(self):
-        self.send("STOP")
-
-    def vent(self):
-        self.send("VENT")
-
     def clear(self):
         self.send("CLEAR")
         if self.telling:
             self.clearing = CLEAR_TICKS
 
-    def permit_failures(self, permitted):
-        """Let the firmware do to itself what the host asks for, which wants everything vented; or no more."""
-        self.send("INJECT", (INJECTION, 0, permitted))
-        if not permitted:
-            self.asked_for.clear()
-
     def ask_for(self, failure, bubble):
-        """The firmware is to make a part of itself fail; the bubbles that it could be are ill, whether it does or not."""
+        """The firmware is to make a part of itself fail: it is ill, whether that was permitted or not."""
         self.send("INJECT", (failure, bubble, 1))
         self.asked_for.add((failure, bubble))
         self.lost[bubble] |= self.is_lost(bubble)
-        if failure in OF_THE_SUPPLY:
-            self.supply_is_ill = True
-        else:
-            self.ill.add(bubble)
+        self.ill.add(bubble)
+        self.supply_is_ill |= failure in OF_THE_SUPPLY
 
     def fall_silent(self):
         self.telling = False
@@ -313,12 +299,12 @@ class Promises(RuleBasedStateMachine):
 
     @rule(duration=_durations)
     def stop(self, duration):
-        self.world.stop()
+        self.world.send("STOP")
         self.world.run(duration)
 
     @rule(duration=_durations)
     def vent(self, duration):
-        self.world.vent()
+        self.world.send("VENT")
         self.world.run(duration)
 
     @rule(duration=_durations, pace=st.sampled_from([1, 2, 20, 60]))
@@ -340,9 +326,8 @@ class Promises(RuleBasedStateMachine):
 
     @rule(permitted=st.sampled_from([1, 1, 1, 0]), duration=st.sampled_from([0.02, 0.3]))
     def permit_failures(self, permitted, duration):
-        if permitted:
-            self.world.vent()
-        self.world.permit_failures(permitted)
+        self.world.send("VENT")  # or it is refused
+        self.world.send("INJECT", (INJECTION, 0, permitted))
         self.world.run(duration)
 
     @rule(failure=st.sampled_from(ON_REQUEST), bubble=st.integers(0, 6), duration=_durations)

@@ -135,7 +135,7 @@ def test_a_leak_fills_no_bubble_past_what_is_asked(leak, seed, world):
     one = world("wristband7", seed=seed)
     one.show([13500] * one.bubbles, 0)
     one.run(0.7)
-    one.vent()
+    one.send("VENT")
     one.run(0.1)
     one.show([13500] * one.bubbles, 0)
     one.run(0.005)

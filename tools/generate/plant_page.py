@@ -21,8 +21,10 @@ FAIL_BEGIN, FAIL_END = "<!-- failures: made by tools/generate/plant_page.py -->\
 
 def failures() -> str:
     """What can fail in which way, and what it does then."""
-    lines = ["| part | how | what it does |", "|---|---|---|"]
-    lines += [f"| {failure.part} | {failure.how} | {failure.meaning} |" for failure in TABLE]
+    lines = ["| part | how | what it does | on a real board |", "|---|---|---|---|"]
+    for failure in TABLE:
+        real = "" if failure.board is None else "✓"
+        lines.append(f"| {failure.part} | {failure.how} | {failure.meaning} | {real} |")
     return "\n".join(lines) + "\n"
 
 

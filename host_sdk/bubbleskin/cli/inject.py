@@ -46,7 +46,7 @@ def inject(
     from bubbleskin.sim.failures import TABLE
 
     if listed:
-        _print_table(json, [(failure.part, failure.how, failure.meaning) for failure in TABLE])
+        _print_table(json, [(each.part, each.how, each.meaning, each.board is not None) for each in TABLE])
         return
     part, number, how = _meant(words)
     with connect(device) as skin, _permitted(skin, permit):
@@ -131,15 +131,14 @@ def _watched(skin: "Skin", fail: Callable[[], None], height: float, seconds: flo
     return list(found.values())
 
 
-def _print_table(json: bool, rows: list[tuple[str, str, str]]) -> None:
+def _print_table(json: bool, rows: list[tuple[str, str, str, bool]]) -> None:
     if json:
-        click.echo(
-            jsonlib.dumps([{"part": part, "how": how, "meaning": meaning} for part, how, meaning in rows], indent=2)
-        )
+        names = ("part", "how", "meaning", "real_board")
+        click.echo(jsonlib.dumps([dict(zip(names, row, strict=True)) for row in rows], indent=2))
         return
-    table = Table("part", "how", "what it does then")
-    for row in rows:
-        table.add_row(*row)
+    table = Table("part", "how", "what it does then", "on a real board")
+    for part, how, meaning, real in rows:
+        table.add_row(part, how, meaning, "yes" if real else "")
     Console().print(table)
 
 
