@@ -15,6 +15,7 @@ from bubble_protocol.schema.packed import PACKED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
 
 TEXT_SIZE = 16  # bytes of a text, each a value of its own
 
@@ -161,4 +162,16 @@ class Packer:
         return _first_out_of_range(values, self._lows, self._highs, self.fixed_values, self.stride_values, end)
 
 
-BY_ID = {data[0]: Packer(*data[1:]) for data in PACKED}
+def _packers() -> "dict[int, Packer]":
+    """By the message's id. Messages of the same bytes, and half of all are replies with nothing but a time, share one."""
+    made: "dict[tuple[Any, ...], Packer]" = {}
+    found = {}
+    for data in PACKED:
+        kinds = data[1:]
+        if kinds not in made:
+            made[kinds] = Packer(*kinds)
+        found[data[0]] = made[kinds]
+    return found
+
+
+BY_ID = _packers()
