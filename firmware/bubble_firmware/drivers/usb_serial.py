@@ -18,7 +18,10 @@ import sys
 import micropython
 
 from bubble_protocol.frame import copy
-from bubble_protocol.mpy_compat import ptr32
+from bubble_protocol.mpy_compat import TYPE_CHECKING, ptr32
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _BUFFER = 256  # CFG_TUD_CDC_TX_BUFSIZE
 _CHUNK = 63  # bytes read at once after the first
@@ -40,33 +43,37 @@ class UsbSerial:
 
     def __init__(self) -> None:
         micropython.kbd_intr(-1)  # a byte of 3 is a byte
-        self._in = sys.stdin.buffer
         self._out = sys.stdout.buffer
         self._filler = io.BytesIO(_FILLER)
         self._filler.write(b"\0")  # from now on it has memory of its own
-        self._first = bytearray(1)
-        self._more = bytearray(_CHUNK)
         self._waiting = 0
         os.dupterm(self._filler)
 
-    def receive(self, buffer: bytearray) -> int:
-        """Put the bytes that have come at the start of `buffer`; returns how many."""
-        filler = self._filler
-        at = filler.tell()
-        if at > _REWIND:
-            filler.seek(0)
-            at = 0
-        self._in.readinto(self._first)
-        if self._waiting and not _sending():
-            self._waiting = 0
-        if filler.tell() != at:
-            return 0
-        more = self._more
-        self._in.readinto(more)
-        count = _CHUNK - filler.tell() + at
-        buffer[0] = self._first[0]
-        copy(more, 0, count, buffer, 1)
-        return 1 + count
+        # Defaults are locals, see `Bubbles`.
+        def receive(
+            buffer: bytearray,
+            first: bytearray = bytearray(1),  # noqa: B008 - made once, and used by this port alone
+            more: bytearray = bytearray(_CHUNK),  # noqa: B008
+            filler: io.BytesIO = self._filler,
+            readinto: "Callable[[bytearray], int]" = sys.stdin.buffer.readinto,
+        ) -> int:
+            """Put the bytes that have come at the start of `buffer`; returns how many."""
+            at = filler.tell()
+            if at > _REWIND:
+                filler.seek(0)
+                at = 0
+            readinto(first)
+            if self._waiting and not _sending():
+                self._waiting = 0
+            if filler.tell() != at:
+                return 0
+            readinto(more)
+            count = _CHUNK - filler.tell() + at
+            buffer[0] = first[0]
+            copy(more, 0, count, buffer, 1)
+            return 1 + count
+
+        self.receive = receive
 
     def send(self, frame: bytearray, length: int) -> bool:
         """Send `frame[:length]` if there is room for all of it; says whether there was."""

@@ -46,17 +46,16 @@ _VENTING_US = const(2000000)  # a full bubble is empty in half a second: what is
 
 
 class SafetyState:
-    """`mode` is the state of the board, one of MODES; `handle` changes it."""
+    """`mode` is the state of the board, one of MODES; `handle` changes it.
+
+    `control_mode`: what control is to do, 0 open the vents, 1 follow the setpoints, 2 keep all valves closed.
+    """
 
     def __init__(self, board: "ModuleType"):
         self.mode = _BOOT
+        self.control_mode = _CONTROL_MODES[_BOOT]
         self._venting_max = _VENTING_US // board.TICK_US
         self._venting_ticks = 0
-
-    @property
-    def control_mode(self) -> int:
-        """What control is to do: 0 open the vents, 1 follow the setpoints, 2 keep all valves closed."""
-        return _CONTROL_MODES[self.mode]
 
     def handle(self, event: int) -> bool:
         """Something has happened: the state follows the table. Returns whether it has changed."""
@@ -64,12 +63,12 @@ class SafetyState:
         if mode == self.mode:
             return False
         self.mode = mode
+        self.control_mode = _CONTROL_MODES[mode]
         self._venting_ticks = 0
         return True
 
     def update_venting(self, pressed: int) -> None:
-        """One tick on the way to IDLE: there, when no bubble is `pressed` any longer or it has taken too long."""
-        if self.mode == _VENTING:
-            self._venting_ticks += 1
-            if not pressed or self._venting_ticks >= self._venting_max:
-                self.handle(DEPRESSURISED)
+        """One tick of VENTING on the way to IDLE: there, when no bubble is `pressed` any longer or it has taken too long."""
+        self._venting_ticks += 1
+        if not pressed or self._venting_ticks >= self._venting_max:
+            self.handle(DEPRESSURISED)
