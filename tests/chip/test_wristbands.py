@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import bubbleskin as bs
+from bubble_protocol.schema import injection
+from bubbleskin.link.link import run_sync
 from bubbleskin.sim.wiring import Wiring
 
 pytestmark = pytest.mark.chip
@@ -163,3 +165,19 @@ def test_a_program_that_hangs_is_ended_by_the_watchdog_and_says_so_afterwards(em
     health = skin.health()
     assert "watchdog" in health.board_faults
     assert health.mode in ("boot", "idle")
+
+
+@pytest.mark.parametrize("name", ["wristband7", "wristband19"])
+def test_failures_on_request_make_no_tick_late(emulated, name):
+    """As a real board is asked for them: by the link."""
+    skin = emulated(name)
+    ill = skin.info.bubbles - 1
+    skin.permit_injection()
+    skin.show(DOME[name], wait=False)
+    for request in ((injection.FILL_SHUT, 0, 1), (injection.VENT_OPEN, ill, 1), (injection.SENSOR_MISSING, ill - 1, 1)):
+        run_sync(skin.link.call("INJECT", request))
+    skin.sleep(0.3)
+    assert ill - 1 in skin.faults()
+    assert skin.simulated.pulses[0, 0] == 0.0
+    assert skin.simulated.pulses[ill, 1] == skin.simulated.tick_s
+    assert skin.health().late_ticks == 0
