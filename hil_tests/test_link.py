@@ -116,6 +116,7 @@ def test_tables_come_back_as_they_were_sent(skin, kept_tables):
     assert skin.health().tables_crc == crc(sent) != crc(kept_tables)
 
 
+@pytest.mark.promise("air-not-tables")
 @pytest.mark.long
 def test_a_table_that_is_wrong_does_not_lead_the_height_astray(skin, kept_tables):
     """Air is metered: a bubble takes the pressure that its rubber has at this height, whatever its table says."""
@@ -129,6 +130,7 @@ def test_a_table_that_is_wrong_does_not_lead_the_height_astray(skin, kept_tables
     assert (np.abs(pressure - nominal) < np.abs(pressure - wanted)).all()
 
 
+@pytest.mark.promise("refused-not-applied")
 def test_tables_that_end_too_low_are_refused_and_not_used(skin, kept_tables):
     low = bs.build_table(bs.YeohBalloon(), height_mm=(5.0, 10.0))
     with pytest.raises(bs.DeviceRefused, match="greatest height"):

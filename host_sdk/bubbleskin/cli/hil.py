@@ -58,7 +58,7 @@ def hil(devices: tuple[str, ...], only: str | None, html: Path | None, junit: Pa
         arguments += ["--target", device]
     arguments += ["-k", only] if only else []
     arguments += [f"--html={html}", "--self-contained-html"] if html else []
-    arguments += [f"--junit-xml={junit}"] if junit else []
+    arguments += [f"--junit-xml={junit}", "-o", "junit_family=xunit1"] if junit else []  # with figures of tests
     arguments += ["--collect-only", "-q"] if names else []
     raise SystemExit(pytest.main(arguments))
 
