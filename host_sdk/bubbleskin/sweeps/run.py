@@ -3,9 +3,10 @@
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ Progress = Callable[[int, int], None]
 
 _HANDFUL_S = 1.0
 """At least this much work goes to a worker at once: handing over costs some milliseconds."""
+_ALONE = 64
+"""So many points go one by one, to every worker at once: the first of each also pays for what it imports and compiles."""
+_Found = tuple[list[Row], float]
 
 
 def sweep(
@@ -58,27 +62,34 @@ def sweep(
 
 
 def _results(study: Study, left: list[Point], executor: Executor) -> Iterable[list[Row]]:
-    """Rows as they come. The first point alone says how many make a handful."""
-    first = executor.submit(work, study.task, dict(study.options), left[:1])
+    """Rows as they come. The quickest of the first points says how many make a handful, before workers run out of them."""
+
+    def submit(points: list[Point]) -> "Future[_Found]":
+        return executor.submit(work, study.task, dict(study.options), points)
+
+    futures: list[Future[_Found]] = []
     try:
-        rows, seconds = first.result()
-        yield rows
-        size = max(1, min(round(_HANDFUL_S / max(seconds, 1e-3)), 64))
-        handfuls = [left[at : at + size] for at in range(1, len(left), size)]
-        futures = [executor.submit(work, study.task, dict(study.options), handful) for handful in handfuls]
-        try:
-            for future in as_completed(futures):
-                yield future.result()[0]
-        finally:
-            for future in futures:
-                future.cancel()
+        futures += [submit([point]) for point in left[:_ALONE]]
+        quickest, told = _HANDFUL_S, set()
+        for future in islice(as_completed(futures), (len(futures) + 1) // 2):
+            rows, seconds = future.result()
+            quickest = min(quickest, seconds)
+            told.add(future)
+            yield rows
+        size = max(1, min(round(_HANDFUL_S / max(quickest, 1e-3)), 64))
+        futures += [submit(left[at : at + size]) for at in range(_ALONE, len(left), size)]
+        for future in as_completed(future for future in futures if future not in told):
+            yield future.result()[0]
     except BrokenProcessPool:
         raise BubbleskinError(
             "A process of the sweep was killed, perhaps for want of memory. Rows so far are kept; ask for the same again."
         ) from None
+    finally:
+        for future in futures:
+            future.cancel()
 
 
-def work(task: str, options: Mapping[str, Any], points: list[Point]) -> tuple[list[Row], float]:
+def work(task: str, options: Mapping[str, Any], points: list[Point]) -> _Found:
     """What a worker does with some points: rows, and seconds for each."""
     begin = time.perf_counter()
     rows = [_row(task, options, point) for point in points]
