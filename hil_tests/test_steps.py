@@ -194,3 +194,18 @@ def test_tops_where_neighbours_lift_and_squeeze(skin, record_property):
             off = np.abs(skin.simulated.height_mm - asked).max()
             record_property(f"error of true tops, mm (at most {NEAR_PRESSED})", off)
             assert skin.simulated.height_mm == pytest.approx(asked, abs=NEAR_PRESSED)
+
+
+@pytest.mark.promise("how-sure")
+@pytest.mark.long
+@pytest.mark.not_on("board", "nobody knows its true heights")
+def test_heights_are_told_with_how_sure_they_are(skin, record_property):
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        skin.show(random_heights(rng, skin.info.bubbles), plan=False)
+        state, true_mm = skin.state(), skin.simulated.alone_mm
+        off = np.abs(true_mm - state.alone_mm)
+        record_property("off by, standard deviations (at most 2)", (off / state.sd_mm).max())
+        assert (off <= 2 * state.sd_mm).all()
+        settled = np.array([status == "settled" for status in state.status])
+        assert np.abs(true_mm - state.target_mm)[settled].max(initial=0.0) < 0.5

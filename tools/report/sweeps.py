@@ -16,24 +16,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import bubbleskin as bs
+from bubbleskin.sweeps.workers import processes
 
 STUDY = 'name = "sheets"\ntask = "reach"\nseeds = {sheets}\n[plant]\nspread = 0.1\nrubber = "real"\n[options]\nhold_s = 5.0\n'
 GOAL = 1.8
 """Times as fast as one process, on two."""
 WAIT_S = 3600.0
-
-
-@contextmanager
-def processes(count: int) -> Iterator[Executor]:
-    """So many processes, as `--workers` starts them."""
-    with ProcessPoolExecutor(count) as executor:
-        yield executor
 
 
 @contextmanager

@@ -1,11 +1,12 @@
 """A sweep runs: points go to an executor in handfuls, rows come back and are kept at once."""
 
+import logging
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,11 @@ import numpy as np
 
 from bubbleskin import checks
 from bubbleskin.connecting import connect
-from bubbleskin.errors import BubbleskinError
+from bubbleskin.errors import BubbleskinError, InvalidInput
 from bubbleskin.sweeps.rows import Row, Rows, figures
 from bubbleskin.sweeps.study import Point, Study
-from bubbleskin.sweeps.tasks import task_of
+from bubbleskin.sweeps.tasks import check_options, task_of
+from bubbleskin.sweeps.workers import processes
 
 Progress = Callable[[int, int], None]
 """Called with how many points are done, and how many there are."""
@@ -45,7 +47,7 @@ def sweep(
     """
     if not isinstance(study, Study):
         study = Study.of(study) if isinstance(study, Mapping) else Study.load(study)
-    task_of(study.task)
+    check_options(study.task, study.options)
     rows = Rows(study, None if out is None else Path(out))
     points = study.points()
     with rows, ExitStack() as ours:
@@ -53,7 +55,7 @@ def sweep(
         if progress:
             progress(len(points) - len(left), len(points))
         if left:
-            workers = executor or ours.enter_context(ProcessPoolExecutor())
+            workers = executor or ours.enter_context(processes())
             for found in _results(study, left, workers):
                 rows.add(found)
                 if progress:
@@ -92,8 +94,20 @@ def _results(study: Study, left: list[Point], executor: Executor) -> Iterable[li
 def work(task: str, options: Mapping[str, Any], points: list[Point]) -> _Found:
     """What a worker does with some points: rows, and seconds for each."""
     begin = time.perf_counter()
-    rows = [_row(task, options, point) for point in points]
+    with _warnings_unsaid():
+        rows = [_row(task, options, point) for point in points]
     return rows, (time.perf_counter() - begin) / len(points)
+
+
+@contextmanager
+def _warnings_unsaid() -> Iterator[None]:
+    """Warnings go where a program sends its log, and nowhere by themselves: they do not say of which wristband they are."""
+    logger, nowhere = logging.getLogger("bubbleskin"), logging.NullHandler()
+    logger.addHandler(nowhere)
+    try:
+        yield
+    finally:
+        logger.removeHandler(nowhere)
 
 
 def _row(task: str, options: Mapping[str, Any], point: Point) -> Row:
@@ -102,6 +116,8 @@ def _row(task: str, options: Mapping[str, Any], point: Point) -> Row:
     try:
         with connect(point.url) as skin:
             found = task_of(task)(skin, np.random.default_rng(int(seed)), **options)
+        if not isinstance(found, Mapping):
+            raise InvalidInput(f"The task {task} returned {checks.shown(found)}; it returns numbers by their names.")
         row |= {name: checks.number(f"{name} of the task {task}", value) for name, value in found.items()}
         row["error"] = ""
     except BubbleskinError as error:
