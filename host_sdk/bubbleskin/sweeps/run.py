@@ -24,7 +24,7 @@ from bubbleskin.sweeps.workers import processes
 Progress = Callable[[int, int], None]
 """Called with how many points are done, and how many there are."""
 
-_HANDFUL_S = 1.0
+_HANDFUL_S = 0.5
 """At least this much work goes to a worker at once: handing over costs some milliseconds."""
 _ALONE = 64
 """So many points go one by one, to every worker at once: the first of each also pays for what it imports and compiles."""
