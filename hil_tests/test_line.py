@@ -1,5 +1,7 @@
 """A line that garbles, repeats and loses: each request is applied once, as it was asked, or not at all."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -186,3 +188,44 @@ def test_a_restart_is_told_and_nothing_is_sent_again(skin):
     skin.restart()
     skin.sleep(2.0)
     assert skin.state().mode in ("boot", "venting", "idle"), "the shape has gone with the restart"
+
+
+@pytest.mark.promise("threads")
+@pytest.mark.long
+def test_threads_share_a_skin(skin):
+    n, wrong = skin.info.bubbles, []
+
+    def work(number):
+        try:
+            for turn in range(5):
+                skin.show(np.full(n, 6.0 + number / 10 + turn / 100), wait=False)
+                if np.ptp(skin.state().target_mm) > 1e-3:
+                    wrong.append("a mixture of two shapes")
+        except bs.BubbleskinError as error:
+            wrong.append(str(error))
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
+
+
+@pytest.mark.promise("memory")
+@pytest.mark.not_on("sim", "CPython's heap says nothing about MicroPython's")
+def test_requests_leave_the_heap_as_it_is(skin, record_property):
+    def free():
+        return skin.health().heap_free
+
+    n = skin.info.bubbles
+    for _ in range(3):  # what is made once has been made
+        skin.show(np.full(n, 6.0), wait=False)
+        before = free()
+    for _ in range(30):
+        skin.show(np.full(n, 6.0), wait=False)
+        with pytest.raises(bs.DeviceRefused):
+            raw_show(skin, [round(skin.info.height_max_mm * 1000) + 1] * n)
+    used = before - free()
+    record_property("heap used by 60 requests, bytes (at most 1024)", used)
+    assert used <= 1024

@@ -3,12 +3,14 @@
 A wristband on a desk cannot be made to fail, so what needs a failure is tried on simulated boards only, and said.
 """
 
+import contextlib
 import dataclasses
 
 import numpy as np
 import pytest
 
 import bubbleskin as bs
+from bubbleskin.link.link import run_sync
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -280,3 +282,28 @@ def test_a_trim_beyond_the_boards_limits_is_refused_and_not_used(skin):
     with pytest.raises(bs.DeviceRefused, match="zero"):
         skin.upload_trim(dataclasses.replace(trim, zero=trim.zero + 300))
     assert (skin.trim().zero == trim.zero).all()
+
+
+@pytest.mark.promise("pressure-limit", "height-limit", "clearing-disarms-nothing")
+@needs_a_failure
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("failure", "value"), [("sensor_stuck", 700), ("fill_stuck", -1), ("vent_stuck", -1), ("pop_off", 1)]
+)
+def test_a_host_that_clears_all_the_time_disarms_nothing(skin, failing, failure, value, record_property):
+    """By the plant's truth, with heights up to the limit asked again and again."""
+    n, board = skin.info.bubbles, skin.simulated
+    most_kpa = most_mm = 0.0
+    failing(failure, 2, value)
+    for k in range(40):
+        asked = np.full(n, (9.0, skin.info.height_max_mm)[k // 4 % 2])
+        with contextlib.suppress(bs.DeviceRefused):
+            skin.show(asked, wait=False, plan=False)
+        run_sync(skin.link.call("CLEAR"))  # `clear_faults` would wait until an isolation is over
+        for _ in range(20):
+            skin.sleep(skin.info.tick)
+            most_kpa, most_mm = max(most_kpa, board.plant.pressure_pa.max() / 1e3), max(most_mm, board.alone_mm.max())
+    record_property(f"true pressure, kPa (at most {skin.info.pressure_max_kpa + 1:g})", most_kpa)
+    record_property(f"true height, mm (at most {skin.info.height_max_mm + 0.4:g})", most_mm)
+    assert most_kpa <= skin.info.pressure_max_kpa + 1
+    assert most_mm <= skin.info.height_max_mm + 0.4

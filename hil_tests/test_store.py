@@ -59,3 +59,14 @@ def test_saving_is_refused_while_a_shape_is_held(stored):
     skin.show([6.0] * skin.info.bubbles)
     with pytest.raises(bs.DeviceRefused, match="not vented"):
         skin.save()
+
+
+@pytest.mark.promise("no-needless-wear", "store-told")
+@pytest.mark.long
+def test_what_is_saved_already_is_not_written_again(stored):
+    skin = stored
+    skin.save()
+    before = skin.stored()
+    skin.save()
+    assert skin.stored() == before
+    assert before.source == skin.health().store in {"slot_a", "slot_b"}
