@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from pathlib import Path
 
 import pandas as pd
@@ -123,6 +123,24 @@ def test_a_task_that_fails_is_a_row_that_says_so(task, said):
 def test_a_worker_that_is_killed_is_a_sentence(tmp_path):
     with ProcessPoolExecutor(1) as one, pytest.raises(bs.BubbleskinError, match="was killed"):
         bs.sweep({"task": "tasks:dies"}, one, out=tmp_path / "rows.csv")
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (CancelledError(), "the scheduler does not answer"),
+        (ModuleNotFoundError("No module"), "ModuleNotFoundError: No module"),
+    ],
+)
+def test_workers_that_go_are_a_sentence(raised, said):
+    class Gone(Executor):
+        def submit(self, work, /, *args, **kwargs):
+            future = Future()
+            future.set_exception(raised)
+            return future
+
+    with pytest.raises(bs.BubbleskinError, match=said):
+        bs.sweep(RISE, Gone())
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """`bubbleskin sweep`: a study's task on many simulated wristbands."""
 
 import json as jsonlib
+import logging
 import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor
@@ -104,6 +105,10 @@ def _dask(address: str) -> Iterator[Executor]:
         raise BubbleskinError(
             f"No Dask scheduler answers at {address}: {error}. Start one with `dask scheduler`."
         ) from None
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(
+            logging.CRITICAL
+        )  # that its scheduler has gone it says with tracebacks, after we have
     with client:
         yield client.get_executor()
 

@@ -4,7 +4,7 @@ import logging
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import CancelledError, Executor, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from itertools import islice
@@ -74,21 +74,30 @@ def _results(study: Study, left: list[Point], executor: Executor) -> Iterable[li
         futures += [submit([point]) for point in left[:_ALONE]]
         quickest, told = _HANDFUL_S, set()
         for future in islice(as_completed(futures), (len(futures) + 1) // 2):
-            rows, seconds = future.result()
+            rows, seconds = _outcome(future)
             quickest = min(quickest, seconds)
             told.add(future)
             yield rows
         size = max(1, min(round(_HANDFUL_S / max(quickest, 1e-3)), 64))
         futures += [submit(left[at : at + size]) for at in range(_ALONE, len(left), size)]
         for future in as_completed(future for future in futures if future not in told):
-            yield future.result()[0]
-    except BrokenProcessPool:
-        raise BubbleskinError(
-            "A process of the sweep was killed, perhaps for want of memory. Rows so far are kept; ask for the same again."
-        ) from None
+            yield _outcome(future)[0]
     finally:
         for future in futures:
             future.cancel()
+
+
+def _outcome(future: "Future[_Found]") -> _Found:
+    """What a worker has found. A task's own errors are in its rows, so that whatever is raised is of who ran it."""
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        said = "A process of the sweep was killed, perhaps for want of memory."
+    except CancelledError:
+        said = "Those who worked for the sweep have gone: the scheduler does not answer any more, or has been closed."
+    except Exception as error:  # whatever kind of executor it is, and whatever it lacks
+        said = f"A worker of the sweep failed: {type(error).__name__}: {error}."
+    raise BubbleskinError(f"{said} Rows so far are kept; ask for the same again.")
 
 
 def work(task: str, options: Mapping[str, Any], points: list[Point]) -> _Found:
