@@ -1,6 +1,6 @@
 """A sweep on one process, on two, and on two workers of a local Dask cluster: seconds, and whether rows are the same. And killed.
 
-python tools/report/sweeps.py [--sheets 200]      # ten minutes on two cores that do nothing else
+python tools/report/sweeps.py [--sheets 200]      # some two minutes on two cores that do nothing else
 
 *CPU*: seconds of all processors together, workers and what starts them: twice as fast is only what needs no more of it. The sweep
 that is killed is `bubbleskin sweep` on two processes, ended by SIGKILL after a quarter of its rows, and asked for again.
