@@ -32,7 +32,14 @@ MARKS = {
     "slow": "takes seconds",
     "medium": "takes half a second and more",
     "long": "takes long in the chip's own time: left out on an emulated chip",
+    "promise": "promise(id, …): shows these promises of hil_tests/promises.toml; the first has the test's figures",
+    "fails_on_purpose": "makes a part fail: on a real board only with --permit-failures",
+    "not_on": "not_on(target, reason): cannot be tried on sim, micropython, rp2040 or a board",
 }
+KINDS = ("sim", "micropython", "rp2040", "board")
+"""Of targets: what runs the firmware. `board` is a real one, whatever its port."""
+NOT_PERMITTED = "a real board is made to fail only where --permit-failures says so"
+LONG = "an emulated second takes twenty"
 
 _SKIN = pytest.StashKey[bs.Skin]()
 
@@ -65,7 +72,7 @@ def pytest_generate_tests(metafunc):
 
 
 def pytest_collection_modifyitems(config, items):
-    """In an order that is kind to a board; on an emulated chip without what is `long`.
+    """In an order that is kind to a board, without what cannot be tried there; a real board's report says why.
 
     An emulated chip takes 20 times longer than a real one: there, hangs are found later, too.
     """
@@ -73,14 +80,39 @@ def pytest_collection_modifyitems(config, items):
     places = [place for place, item in enumerate(items) if "target" in getattr(item, "fixturenames", ())]
     for place, item in zip(places, sorted(ours, key=_turn), strict=True):
         items[place] = item
-    emulated = [item for item in ours if _target(item).startswith("rp2040:")]
-    left_out = [item for item in emulated if item.get_closest_marker("long")]
-    for item in emulated:
-        if guard := item.get_closest_marker("timeout"):
+    left_out = []
+    for item in ours:
+        kind = kind_of(_target(item))
+        item.user_properties.append(("target", kind))
+        reason = why_not(item, kind)
+        if reason and kind == "board":
+            item.add_marker(pytest.mark.skip(reason=reason))
+        elif reason:
+            left_out.append(item)
+        if kind == "rp2040" and (guard := item.get_closest_marker("timeout")):
             item.add_marker(pytest.mark.timeout(EMULATED_SLOWNESS * guard.args[0]), append=False)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
+
+
+def kind_of(target: str) -> str:
+    """Which of `KINDS` a device is."""
+    scheme, colon, _ = target.partition("://")
+    return scheme if colon and scheme in KINDS else "board"
+
+
+def why_not(item, kind: str) -> str:
+    """Why a test is not tried on such a target; nothing where it is."""
+    if kind == "rp2040" and item.get_closest_marker("long"):
+        return LONG
+    if (
+        kind == "board"
+        and item.get_closest_marker("fails_on_purpose")
+        and not item.config.getoption("--permit-failures")
+    ):
+        return NOT_PERMITTED
+    return next((reason for at, reason in (mark.args for mark in item.iter_markers("not_on")) if at == kind), "")
 
 
 def _target(item) -> str:

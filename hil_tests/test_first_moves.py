@@ -10,6 +10,7 @@ pytestmark = pytest.mark.timeout(60)
 LOW_MM = 6.5  # some 18 kPa: little air, and a bubble that is seen to rise
 
 
+@pytest.mark.promise("self-test")
 @pytest.mark.long
 def test_the_self_test_has_found_nothing(target):
     """It runs at boot, and whatever is asked of the board ends it: so this only waits."""
@@ -25,24 +26,27 @@ def test_the_self_test_has_found_nothing(target):
         assert health.board_faults == ()
 
 
-def test_the_first_bubble_rises_a_little_and_comes_back(skin):
-    _alone(skin, 0)
+@pytest.mark.promise("own-height")
+def test_the_first_bubble_rises_a_little_and_comes_back(skin, record_property):
+    _alone(skin, 0, record_property)
 
 
+@pytest.mark.promise("own-height")
 @pytest.mark.long
-def test_each_bubble_moves_when_it_is_asked_and_no_other(skin):
+def test_each_bubble_moves_when_it_is_asked_and_no_other(skin, record_property):
     """Swapped tubes and wires show here: the pressure rises elsewhere."""
     for bubble in range(skin.info.bubbles):
-        _alone(skin, bubble)
+        _alone(skin, bubble, record_property)
 
 
-def _alone(skin, bubble):
+def _alone(skin, bubble, record_property):
     heights = np.zeros(skin.info.bubbles)
     heights[bubble] = LOW_MM
     skin.show(heights)
     pressure = skin.state().pressure_kpa
     others = np.arange(skin.info.bubbles) != bubble
     assert pressure[bubble] > 5, f"bubble {bubble} was asked to rise: is its tube where its valves are?"
+    record_property("pressure of the others, kPa (at most 2)", np.abs(pressure[others]).max())
     assert np.abs(pressure[others]).max() < 2, f"only bubble {bubble} was asked to rise"
     skin.vent()
     skin.sleep(0.8)

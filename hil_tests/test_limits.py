@@ -52,6 +52,7 @@ def unsent(skin):
     assert state.target_mm == pytest.approx(6.0)
 
 
+@pytest.mark.promise("refused-unsent")
 @pytest.mark.long
 @pytest.mark.usefixtures("unsent")
 @pytest.mark.parametrize("wrong", WRONG_HEIGHTS)
@@ -63,6 +64,7 @@ def test_heights(skin, wrong):
     assert isinstance(caught.value, ValueError)
 
 
+@pytest.mark.promise("refused-unsent")
 @pytest.mark.long
 @pytest.mark.usefixtures("unsent")
 @pytest.mark.parametrize("over", [-0.1, 60.1, math.inf, math.nan])
@@ -71,6 +73,7 @@ def test_over(skin, over):
         skin.show(np.full(skin.info.bubbles, 7.0), over=over)
 
 
+@pytest.mark.promise("refused-unsent")
 @pytest.mark.long
 @pytest.mark.usefixtures("unsent")
 @pytest.mark.parametrize("rate_hz", [0, -1, math.nan, 1e4])
@@ -79,6 +82,7 @@ def test_telemetry_rate(skin, rate_hz):
         next(skin.telemetry(rate_hz))
 
 
+@pytest.mark.promise("refused-unsent")
 @pytest.mark.usefixtures("unsent")
 def test_number_of_tables(skin):
     table = bs.build_table(bs.YeohBalloon())
@@ -94,6 +98,7 @@ def test_the_limits_themselves_are_allowed(skin):
     skin.show(np.zeros(n), wait=False)
 
 
+@pytest.mark.promise("height-held")
 @pytest.mark.long
 def test_the_highest_shape_holds(skin):
     """The board's own limit must not trip over the overshoot of its highest heights."""

@@ -1,5 +1,7 @@
 """A line that garbles, repeats and loses: each request is applied once, as it was asked, or not at all."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,7 @@ def flipped(place):
     return spoil
 
 
+@pytest.mark.promise("exactly-once")
 @pytest.mark.parametrize(
     "place", [0.3, pytest.param(0.5, marks=pytest.mark.long), pytest.param(0.8, marks=pytest.mark.long)]
 )
@@ -55,6 +58,7 @@ def test_a_garbled_show_is_not_applied_but_sent_again(skin, line, place):
     assert skin.health().frames_bad == bad + 1
 
 
+@pytest.mark.promise("exactly-once")
 @pytest.mark.long
 def test_a_show_that_is_lost_is_sent_again(skin, line):
     n = skin.info.bubbles
@@ -63,6 +67,7 @@ def test_a_show_that_is_lost_is_sent_again(skin, line):
     assert skin.state().target_mm == pytest.approx(6.5)
 
 
+@pytest.mark.promise("exactly-once")
 def test_a_show_that_comes_again_later_is_not_applied_again(skin, line):
     n = skin.info.bubbles
     skin.show(np.full(n, 6.0), wait=False)
@@ -73,6 +78,7 @@ def test_a_show_that_comes_again_later_is_not_applied_again(skin, line):
     assert skin.state().target_mm == pytest.approx(7.5)
 
 
+@pytest.mark.promise("exactly-once")
 @pytest.mark.long
 def test_a_vent_that_comes_again_later_does_not_end_a_show(skin, line):
     n = skin.info.bubbles
@@ -84,6 +90,7 @@ def test_a_vent_that_comes_again_later_does_not_end_a_show(skin, line):
     assert skin.state().mode == "active"
 
 
+@pytest.mark.promise("no-frame")
 @pytest.mark.long
 def test_what_is_no_frame_is_left_out(skin, line):
     n = skin.info.bubbles
@@ -94,6 +101,7 @@ def test_what_is_no_frame_is_left_out(skin, line):
     assert skin.state().mode == "active"
 
 
+@pytest.mark.promise("sessions")
 @pytest.mark.long
 def test_requests_of_another_session_are_not_heard(target, skin, line):
     """A frame kept from before a new greeting belongs to nobody."""
@@ -121,6 +129,7 @@ def raw_show(skin, micrometres, over_ms=0):
     at_once(skin.link.call("SHOW", (over_ms,), [(height,) for height in micrometres]))
 
 
+@pytest.mark.promise("height-refused", "refused-not-applied")
 @pytest.mark.parametrize("bubble", [pytest.param(0, marks=pytest.mark.long), -1])
 def test_the_wristband_refuses_what_is_too_high_for_one_bubble_whichever(skin, bubble):
     skin.show(np.full(skin.info.bubbles, 6.0))
@@ -133,6 +142,7 @@ def test_the_wristband_refuses_what_is_too_high_for_one_bubble_whichever(skin, b
     assert state.mode == "active"
 
 
+@pytest.mark.promise("refused-not-applied")
 @pytest.mark.long
 @pytest.mark.parametrize("by", [-1, 1])
 def test_the_wristband_refuses_heights_for_another_number_of_bubbles(skin, by):
@@ -145,3 +155,77 @@ def test_the_wristband_refuses_heights_for_another_number_of_bubbles(skin, by):
 def test_a_show_at_its_limits_is_taken(skin):
     raw_show(skin, [round(skin.info.height_max_mm * 1000)] * skin.info.bubbles, over_ms=60000)
     assert skin.state().mode == "active"
+
+
+@pytest.mark.promise("kept-alive")
+@pytest.mark.long
+def test_a_script_that_thinks_keeps_its_shape(skin):
+    """Longer than the wristband waits for a silent host: the link is kept alive without anybody calling."""
+    skin.show(np.full(skin.info.bubbles, 6.0))
+    told = len(skin.fault_log())
+    skin.sleep(2 * skin.settings()["deadman_vent"].value)
+    assert skin.state().mode == "active"
+    assert len(skin.fault_log()) == told
+
+
+@pytest.mark.promise("silent-device")
+@pytest.mark.long
+def test_no_answer_is_told_in_time_and_may_have_been_applied(skin, line, monkeypatch):
+    with monkeypatch.context() as cut:
+        cut.setattr(skin.link.transport, "write", lambda data: None)
+        with pytest.raises(bs.LinkError) as caught:
+            skin.show(np.full(skin.info.bubbles, 6.5), wait=False)
+    assert isinstance(caught.value, bs.DeviceSilent)
+    assert caught.value.outcome_unknown
+    assert skin.state().mode in ("idle", "venting"), "nothing of it has come"
+
+
+@pytest.mark.promise("restart-told")
+@pytest.mark.long
+@pytest.mark.not_on("board", "a restart of a real board ends its port: done by hand, see docs/store.md")
+def test_a_restart_is_told_and_nothing_is_sent_again(skin):
+    skin.show(np.full(skin.info.bubbles, 6.0))
+    skin.restart()
+    skin.sleep(2.0)
+    assert skin.state().mode in ("boot", "venting", "idle"), "the shape has gone with the restart"
+
+
+@pytest.mark.promise("threads")
+@pytest.mark.long
+def test_threads_share_a_skin(skin):
+    n, wrong = skin.info.bubbles, []
+
+    def work(number):
+        try:
+            for turn in range(5):
+                skin.show(np.full(n, 6.0 + number / 10 + turn / 100), wait=False)
+                if np.ptp(skin.state().target_mm) > 1e-3:
+                    wrong.append("a mixture of two shapes")
+        except bs.BubbleskinError as error:
+            wrong.append(str(error))
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
+
+
+@pytest.mark.promise("memory")
+@pytest.mark.not_on("sim", "CPython's heap says nothing about MicroPython's")
+def test_requests_leave_the_heap_as_it_is(skin, record_property):
+    def free():
+        return skin.health().heap_free
+
+    n = skin.info.bubbles
+    for _ in range(3):  # what is made once has been made
+        skin.show(np.full(n, 6.0), wait=False)
+        before = free()
+    for _ in range(30):
+        skin.show(np.full(n, 6.0), wait=False)
+        with pytest.raises(bs.DeviceRefused):
+            raw_show(skin, [round(skin.info.height_max_mm * 1000) + 1] * n)
+    used = before - free()
+    record_property("heap used by 60 requests, bytes (at most 1024)", used)
+    assert used <= 1024

@@ -116,6 +116,7 @@ def test_tables_come_back_as_they_were_sent(skin, kept_tables):
     assert skin.health().tables_crc == crc(sent) != crc(kept_tables)
 
 
+@pytest.mark.promise("air-not-tables")
 @pytest.mark.long
 def test_a_table_that_is_wrong_does_not_lead_the_height_astray(skin, kept_tables):
     """Air is metered: a bubble takes the pressure that its rubber has at this height, whatever its table says."""
@@ -129,9 +130,26 @@ def test_a_table_that_is_wrong_does_not_lead_the_height_astray(skin, kept_tables
     assert (np.abs(pressure - nominal) < np.abs(pressure - wanted)).all()
 
 
+@pytest.mark.promise("refused-not-applied")
 def test_tables_that_end_too_low_are_refused_and_not_used(skin, kept_tables):
     low = bs.build_table(bs.YeohBalloon(), height_mm=(5.0, 10.0))
     with pytest.raises(bs.DeviceRefused, match="greatest height"):
         skin.upload_tables(low)
     assert skin.health().tables_crc == crc(kept_tables)
     assert crc(skin.read_tables()) == crc(kept_tables)
+
+
+@pytest.mark.promise("no-false-rubber")
+def test_a_table_that_is_none_of_rubber_is_refused_before_it_is_sent(skin, kept_tables):
+    straight = bs.Table([5000, round(skin.info.height_max_mm * 1000)], [0, 36000])
+    with pytest.raises(bs.InvalidInput, match="not one of rubber"):
+        skin.upload_tables(straight)
+    assert skin.health().tables_crc == crc(kept_tables)
+
+
+@pytest.mark.promise("uploads-raise-no-limit")
+def test_a_table_of_more_air_than_the_board_allows_is_refused_whoever_asks(skin, kept_tables):
+    stiff = bs.Table([5000, round(skin.info.height_max_mm * 1000)], [0, round(skin.info.pressure_max_kpa * 1000)])
+    with pytest.raises(bs.DeviceRefused, match="greatest height"):
+        skin.upload_tables(stiff, anyway=True)
+    assert skin.health().tables_crc == crc(kept_tables)

@@ -4,14 +4,15 @@ import pytest
 
 import bubbleskin as bs
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = [
+    pytest.mark.timeout(120),
+    pytest.mark.not_on("board", "a restart of a real board ends its port: done by hand, see docs/store.md"),
+]
 
 
 @pytest.fixture
 def stored(skin):
     """A wristband that may be saved to: what it had stored is stored again in the end."""
-    if skin.simulated is None:
-        pytest.skip("a restart of a real board ends its port: done by hand, see docs/store.md")
     tables = skin.read_tables()
     yield skin
     skin.vent()
@@ -23,6 +24,7 @@ def restart(skin):
     skin.sleep(2.0)  # a chip takes a while to appear on USB again
 
 
+@pytest.mark.promise("saved-stays")
 @pytest.mark.long
 def test_saved_tables_are_in_use_after_a_restart(stored):
     skin = stored
@@ -40,6 +42,7 @@ def test_saved_tables_are_in_use_after_a_restart(stored):
     assert skin.health().exceptions == 0
 
 
+@pytest.mark.promise("saved-stays")
 @pytest.mark.long
 def test_a_shape_is_held_as_before(stored):
     skin = stored
@@ -49,9 +52,21 @@ def test_a_shape_is_held_as_before(stored):
     assert abs(state.height_mm - 6.0).max() < 0.2
 
 
+@pytest.mark.promise("vented-only")
 @pytest.mark.long
 def test_saving_is_refused_while_a_shape_is_held(stored):
     skin = stored
     skin.show([6.0] * skin.info.bubbles)
     with pytest.raises(bs.DeviceRefused, match="not vented"):
         skin.save()
+
+
+@pytest.mark.promise("no-needless-wear", "store-told")
+@pytest.mark.long
+def test_what_is_saved_already_is_not_written_again(stored):
+    skin = stored
+    skin.save()
+    before = skin.stored()
+    skin.save()
+    assert skin.stored() == before
+    assert before.source == skin.health().store in {"slot_a", "slot_b"}

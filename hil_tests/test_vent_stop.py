@@ -8,9 +8,10 @@ pytestmark = pytest.mark.timeout(60)
 NO_PRESSURE_KPA = 0.4  # sensor noise is 50 Pa
 
 
+@pytest.mark.promise("vent")
 @pytest.mark.medium
 @pytest.mark.long
-def test_vent_empties_every_bubble_within_a_second(skin):
+def test_vent_empties_every_bubble_within_a_second(skin, record_property):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.5), plan=False)
     skin.vent()
@@ -19,6 +20,7 @@ def test_vent_empties_every_bubble_within_a_second(skin):
         state = skin.state()
         assert state.mode == "idle"
         assert set(state.status) == {"resting"}
+        record_property(f"pressure after 1 s, kPa (at most {NO_PRESSURE_KPA:g})", np.abs(state.pressure_kpa).max())
         assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
         if skin.simulated:
             assert skin.simulated.alone_mm == pytest.approx(skin.info.height_rest_mm, abs=0.1)
@@ -26,10 +28,11 @@ def test_vent_empties_every_bubble_within_a_second(skin):
         skin.sleep(0.25)
 
 
+@pytest.mark.promise("vent")
 @pytest.mark.parametrize(
     "after", [pytest.param(0.0, marks=pytest.mark.long), 0.02, pytest.param(0.1, marks=pytest.mark.long)]
 )
-def test_vent_ends_a_show_that_is_under_way(skin, after):
+def test_vent_ends_a_show_that_is_under_way(skin, after, record_property):
     n = skin.info.bubbles
     skin.show(np.full(n, 12.0), wait=False, plan=False)
     skin.sleep(after)
@@ -37,9 +40,11 @@ def test_vent_ends_a_show_that_is_under_way(skin, after):
     skin.sleep(1.0)
     state = skin.state()
     assert state.mode == "idle"
+    record_property(f"pressure after 1 s, kPa (at most {NO_PRESSURE_KPA:g})", np.abs(state.pressure_kpa).max())
     assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
 
 
+@pytest.mark.promise("vent")
 @pytest.mark.long
 def test_vent_ends_a_ramp(skin):
     n = skin.info.bubbles
@@ -52,15 +57,18 @@ def test_vent_ends_a_ramp(skin):
     assert np.abs(state.pressure_kpa).max() < NO_PRESSURE_KPA
 
 
+@pytest.mark.promise("stop")
 @pytest.mark.long
-def test_stop_keeps_the_air(skin, watch):
+def test_stop_keeps_the_air(skin, watch, record_property):
     n = skin.info.bubbles
     shape = np.linspace(9.0, 12.5, n)
     skin.show(shape, plan=False)
     skin.stop()
     seen = watch(5.0)
     assert np.abs(seen.height_mm - shape).max() <= 0.25
-    assert np.ptp(seen.since(0.1).height_mm, axis=0).max() <= 0.1
+    moved = np.ptp(seen.since(0.1).height_mm, axis=0).max()
+    record_property("moves within 5 s, mm (at most 0.1)", moved)
+    assert moved <= 0.1
     if seen.pulses is not None:
         assert not seen.since(2 * skin.info.tick).pulses.any()
     state = skin.state()
@@ -68,6 +76,7 @@ def test_stop_keeps_the_air(skin, watch):
     assert set(state.status) == {"stopped"}
 
 
+@pytest.mark.promise("stop")
 @pytest.mark.long
 def test_stop_in_the_middle_of_a_move(skin, watch):
     n = skin.info.bubbles
@@ -84,6 +93,7 @@ def test_stop_in_the_middle_of_a_move(skin, watch):
     assert state.target_mm == pytest.approx(state.alone_mm, abs=0.2), "where they are is where they are wanted"
 
 
+@pytest.mark.promise("stop")
 @pytest.mark.long
 def test_stop_while_vented_keeps_what_is_there(skin, watch):
     n = skin.info.bubbles
@@ -96,6 +106,7 @@ def test_stop_while_vented_keeps_what_is_there(skin, watch):
     assert (held.height_mm > skin.info.height_rest_mm + 0.5).all()
 
 
+@pytest.mark.promise("states")
 @pytest.mark.long
 @pytest.mark.parametrize("interruption", ["stop", "vent"])
 def test_a_show_goes_on_afterwards(skin, watch, interruption):
@@ -108,6 +119,7 @@ def test_a_show_goes_on_afterwards(skin, watch, interruption):
     assert np.abs(watch(3.0).since(0.6).height_mm - target).max() <= 0.2
 
 
+@pytest.mark.promise("states")
 def test_vent_and_stop_can_be_said_twice(skin):
     skin.stop()
     skin.stop()

@@ -15,6 +15,7 @@ pytestmark = pytest.mark.medium  # for the calibration that they share
 BOARD = "wristband7"
 
 
+@pytest.mark.promise("calibrated")
 def test_heights_are_true_afterwards(done, sheets):
     assert sheets.rms(done.before_mm) > 0.25
     assert sheets.rms(done.after_mm) < 0.12

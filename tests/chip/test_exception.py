@@ -55,6 +55,7 @@ def skin(uf2):
         yield skin
 
 
+@pytest.mark.promise("failing-tick")
 def test_an_exception_in_the_tick_vents_within_one_and_is_named(skin):
     board = skin.simulated
     skin.show(np.full(7, 11.0), wait=False)

@@ -28,6 +28,7 @@ def reboot(skin):
         ask()
 
 
+@pytest.mark.promise("saved-stays")
 @pytest.mark.parametrize("name", ["wristband7", pytest.param("wristband19", marks=pytest.mark.long)])
 def test_saved_tables_outlive_the_watchdog(emulated, name):
     skin = emulated(name)

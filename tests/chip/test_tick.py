@@ -7,6 +7,7 @@ from bubble_firmware import boards
 pytestmark = pytest.mark.chip
 
 
+@pytest.mark.promise("memory")
 @pytest.mark.parametrize("name", ["wristband7", "wristband19"])
 def test_no_tick_is_late_and_the_heap_stays_as_it_is(uf2, name):
     """Under telemetry at 50 Hz and SHOW at 20 Hz; `bubbleskin bench --target rp2040` does the same for 5 s."""

@@ -103,11 +103,13 @@ def chunks(ticks):
     return [f"replay({ticks[k : k + CHUNK]!r})\n" for k in range(0, len(ticks), CHUNK)]
 
 
+@pytest.mark.promise("same-everywhere")
 def test_micropython_gives_the_same_commands(recording, micropython):
     name, recorded = recording
     assert micropython(REPLAY.format(board=name) + "".join(chunks(recorded.ticks))).split() == recorded.sums
 
 
+@pytest.mark.promise("same-everywhere")
 def test_the_rp2040_gives_the_same_commands(recording, uf2):
     from bubbleskin.sim.rp2040.chip import Chip
     from bubbleskin.sim.rp2040.prompt import Prompt

@@ -74,6 +74,7 @@ def test_a_valve_driver_that_falls_silent_is_cut_off_by_output_enable(emulated):
     assert "valve_chip" in skin.health().board_faults
 
 
+@pytest.mark.promise("emergency-stop")
 def test_the_emergency_stop_vents_within_a_tick(emulated):
     skin = emulated("wristband7")
     board = skin.simulated
@@ -127,6 +128,7 @@ def test_a_valve_driver_that_is_missing_is_named_after_boot_and_the_others_stay_
     assert vented(skin.simulated)
 
 
+@pytest.mark.promise("self-test")
 def test_the_self_test_at_boot_finds_a_stuck_valve_and_no_other(emulated):
     skin = emulated("wristband7")
     skin.simulated.inject("fill_stuck", 3, -1)
@@ -140,6 +142,7 @@ def test_the_self_test_at_boot_finds_a_stuck_valve_and_no_other(emulated):
     assert health.untrue_zero == ()
 
 
+@pytest.mark.promise("failing-tick")
 def test_a_program_that_hangs_is_ended_by_the_watchdog_and_says_so_afterwards(emulated):
     skin = emulated("wristband7")
     board = skin.simulated

@@ -23,14 +23,19 @@ FAILURES = [
 ]
 
 
+@pytest.mark.promise("pressure-limit", "height-limit", "clearing-disarms-nothing", "isolation")
 @pytest.mark.medium
 @pytest.mark.parametrize("pace", PACES)
 @pytest.mark.parametrize(("failure", "value", "fault"), FAILURES)
-def test_clearing_at_any_pace_keeps_true_pressure_and_height_within_their_limits(attack, failure, value, fault, pace):
+def test_clearing_at_any_pace_keeps_true_pressure_and_height_within_their_limits(
+    attack, failure, value, fault, pace, record_property
+):
     attacked = attack(pace, (9000, 14000))
     attacked.board.inject(failure, attacked.ILL, value)
     attacked.run(SECONDS)
     limits = attacked.board.data
+    record_property("true pressure, kPa (at most 43)", attacked.pressure_pa.max() / 1e3)
+    record_property("true height, mm (at most 14.3)", attacked.height_mm.max())
     assert attacked.seen & fault
     assert attacked.pressure_pa.max() <= limits.PRESSURE_MAX_PA + PRESSURE_MARGIN
     assert attacked.height_mm.max() <= limits.HEIGHT_MAX_UM * 1e-3 + HEIGHT_MARGIN
@@ -38,6 +43,7 @@ def test_clearing_at_any_pace_keeps_true_pressure_and_height_within_their_limits
     assert attacked.app.stats.exceptions == 0
 
 
+@pytest.mark.promise("budget", "clearing-disarms-nothing")
 @pytest.mark.medium
 @pytest.mark.parametrize("pace", PACES)
 def test_clearing_at_any_pace_leaves_the_budget_what_it_is(attack, pace):
@@ -47,6 +53,7 @@ def test_clearing_at_any_pace_leaves_the_budget_what_it_is(attack, pace):
     assert attacked.most_above_pa_s <= 11000, "its vent takes 0.1 s to bring it below the threshold"
 
 
+@pytest.mark.promise("stuck-fill-valve")
 @pytest.mark.parametrize("pace", PACES)
 def test_a_fill_valve_stuck_open_is_overfilled_at_any_pace(attack, pace):
     attacked = attack(pace, (10000,))

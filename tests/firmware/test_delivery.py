@@ -46,6 +46,7 @@ def applied(*numbers):
     return [6000 + number % 1000 for number in numbers]
 
 
+@pytest.mark.promise("exactly-once")
 def test_a_request_that_comes_twice_is_applied_once_and_answered_twice(device):
     device.send(show(device, 1))
     device.tick()
@@ -57,6 +58,7 @@ def test_a_request_that_comes_twice_is_applied_once_and_answered_twice(device):
     assert device.applied == applied(1)
 
 
+@pytest.mark.promise("exactly-once")
 @pytest.mark.parametrize("seed", range(5))
 def test_whatever_order_they_come_in_they_are_applied_in_theirs(device, seed):
     order = list(range(1, 1 + receive_window.WINDOW))
@@ -98,6 +100,7 @@ def test_what_is_far_from_its_turn_is_dropped(device, number):
     assert (device.applied, device.said()) == ([], [])
 
 
+@pytest.mark.promise("overtaking")
 @pytest.mark.parametrize("urgent", ["STOP", "VENT"])
 @pytest.mark.parametrize("ahead", [0, 1, 5, system.REPLIES_KEPT - 1])
 def test_stop_and_vent_overtake(device, urgent, ahead):
@@ -129,6 +132,7 @@ def test_what_was_sent_after_a_vent_and_comes_before_it_is_applied_after_it(devi
     assert dict(device.said())[1] == errors.OVERTAKEN
 
 
+@pytest.mark.promise("sessions")
 def test_frames_without_the_key_of_boot_and_session_are_none(device):
     bad = device.app.server.decoder.bad
     for key in (

@@ -134,6 +134,7 @@ def frames(board, every):
     yield sealed(messages.PING, 0, b"last")
 
 
+@pytest.mark.promise("hostile")
 @pytest.mark.parametrize(
     ("name", "every"),
     [

@@ -174,12 +174,14 @@ def assert_golden(trace, firmware):
     return told
 
 
+@pytest.mark.promise("same-everywhere")
 @pytest.mark.medium
 @each_trace
 def test_this_interpreter_decides_as_recorded(trace):
     assert_golden(trace, InProcessFirmware(boards.load(trace["board"]), BOOT_ID))
 
 
+@pytest.mark.promise("same-everywhere")
 @pytest.mark.slow
 @pytest.mark.usefixtures("micropython")  # to be skipped or to fail where there is none
 @each_trace

@@ -15,6 +15,7 @@ def hold(rig):
     rig.tick(40)
 
 
+@pytest.mark.promise("height-refused")
 def test_no_bubble_may_be_asked_for_more_than_the_boards_height(rig):
     n, most = rig.board.BUBBLES, rig.board.HEIGHT_MAX_UM
     for bubble in range(n):
@@ -32,6 +33,7 @@ def press(rig, pressed):
     rig.tick()
 
 
+@pytest.mark.promise("emergency-stop")
 def test_a_pressed_emergency_stop_cannot_be_acknowledged(rig):
     hold(rig)
     press(rig, True)
@@ -49,6 +51,7 @@ def test_a_pressed_emergency_stop_cannot_be_acknowledged(rig):
     assert rig.app.faults.log.acknowledged < rig.app.faults.log.newest
 
 
+@pytest.mark.promise("emergency-stop")
 def test_releasing_the_button_starts_nothing_even_after_a_clear_while_it_was_pressed(rig):
     press(rig, True)
     rig.ask("CLEAR")
@@ -59,6 +62,7 @@ def test_releasing_the_button_starts_nothing_even_after_a_clear_while_it_was_pre
     assert rig.app.safety.mode == modes.VENTING
 
 
+@pytest.mark.promise("emergency-stop")
 def test_pressed_again_within_the_isolation_it_has_to_be_acknowledged_again(rig):
     press(rig, True)
     press(rig, False)
@@ -72,6 +76,7 @@ def test_pressed_again_within_the_isolation_it_has_to_be_acknowledged_again(rig)
 # The watchdog.
 
 
+@pytest.mark.promise("failing-tick")
 @pytest.mark.parametrize("method", ["read_sensors", "write_outputs"])
 def test_a_tick_that_fails_does_not_feed_the_watchdog(rig, method):
     fed = []
@@ -89,6 +94,7 @@ def test_a_tick_that_fails_does_not_feed_the_watchdog(rig, method):
 # Acknowledging.
 
 
+@pytest.mark.promise("fault-stays")
 def test_acknowledging_one_fault_forgets_no_other(rig):
     """Both have passed: what stands is only what has not been acknowledged, of bubbles and of the board."""
     hold(rig)

@@ -17,6 +17,7 @@ def hostile():
     return tool
 
 
+@pytest.mark.promise("memory", "hostile")
 @pytest.mark.medium
 @pytest.mark.parametrize("inputs", [300, pytest.param(10_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])

@@ -25,6 +25,7 @@ def faults(rig, bubble):
     return rig.app.bubbles.faults(bubble)
 
 
+@pytest.mark.promise("failure-on-request")
 def test_without_permission_nothing_fails(rig):
     for failure in range(1, 9):
         assert rig.refused("INJECT", (failure, 0, 1)) == (errors.NOT_PERMITTED, 0, 255, failure, 0, 0)
@@ -33,6 +34,7 @@ def test_without_permission_nothing_fails(rig):
     assert rig.app.hal is rig.hal
 
 
+@pytest.mark.promise("failure-on-request")
 def test_it_is_permitted_only_while_all_is_vented(rig):
     rig.show(8000)
     error, field, *_ = rig.refused("INJECT", (PERMIT, 0, 1))
@@ -43,6 +45,7 @@ def test_it_is_permitted_only_while_all_is_vented(rig):
     assert rig.app.hal is not rig.hal
 
 
+@pytest.mark.promise("failure-on-request")
 def test_it_ends_with_the_next_start_and_when_it_is_forbidden(rig):
     inject(rig, PERMIT)
     inject(rig, MISSING, 1)
@@ -140,6 +143,7 @@ class Inner(Hal):
 _counts = st.sampled_from([0, 100, 168, 2000, 4095, ABSENT])
 
 
+@pytest.mark.promise("failure-on-request")
 @given(st.data())
 def test_no_failure_lets_more_air_in_or_keeps_any(data):
     board = boards.load(data.draw(st.sampled_from(["wristband7", "wristband19"])))

@@ -22,6 +22,7 @@ def commit(rig, bubble, table):
     return rig.ask("TABLE_COMMIT", (zlib.crc32(b"".join(np.array(one, "<u2").tobytes() for one in tables)),))
 
 
+@pytest.mark.promise("uploads-raise-no-limit")
 def test_the_air_of_a_table_is_the_boards_and_no_upload_raises_it(rig):
     board = rig.board
     top = pressure_top(board)
@@ -42,6 +43,7 @@ def test_the_air_of_a_table_is_the_boards_and_no_upload_raises_it(rig):
     )
 
 
+@pytest.mark.promise("uploads-raise-no-limit", "trim-limits")
 @pytest.mark.parametrize("share", [0.25, 0.7, 1.4, 4.0])
 def test_a_flow_that_no_restrictor_of_the_board_has_is_refused(rig, share):
     trim = rig.app.trim
@@ -53,11 +55,12 @@ def test_a_flow_that_no_restrictor_of_the_board_has_is_refused(rig, share):
     assert high == trim.nominal[3] * 4 // 3
 
 
+@pytest.mark.promise("height-any-upload")
 @pytest.mark.medium
 @pytest.mark.parametrize("top", [0, 1])
 @pytest.mark.parametrize("gain", [0, 1, 2])
 @pytest.mark.parametrize("zero", [0, 1])
-def test_no_accepted_upload_makes_a_bubble_higher_than_its_pressure_limit_does(top, gain, zero):
+def test_no_accepted_upload_makes_a_bubble_higher_than_its_pressure_limit_does(top, gain, zero, record_property):
     """The worst of what is accepted, all at once, on rubber that is none of it."""
     board = SimulatedBoard(contact=False)
     app = board.firmware.app
@@ -84,6 +87,7 @@ def test_no_accepted_upload_makes_a_bubble_higher_than_its_pressure_limit_does(t
             app.deadman.host_activity()
             board.tick()
             highest = max(highest, board.height_mm.max())
+    record_property(f"true height, mm (at most {TRUE_MAX_MM:g})", highest)
     assert highest <= TRUE_MAX_MM
     if not (top or gain or zero):
         assert highest <= data.HEIGHT_MAX_UM * 1e-3 + 0.05

@@ -251,6 +251,7 @@ def program_crc(n):
     return zlib.crc32(struct.pack(f"<{len(words)}H", *words))
 
 
+@pytest.mark.promise("memory")
 @pytest.mark.medium
 @pytest.mark.parametrize("sequence", SEQUENCES)
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])

@@ -41,6 +41,7 @@ def resting():
     return Resting()
 
 
+@pytest.mark.promise("correction")
 @pytest.mark.medium
 @given(
     st.integers(100, 60_000),  # µJ

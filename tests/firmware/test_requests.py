@@ -54,6 +54,7 @@ def unchanged(rig):
 # Shapes.
 
 
+@pytest.mark.promise("height-refused")
 @pytest.mark.usefixtures("unchanged")
 def test_a_height_above_the_boards_limit_is_refused(rig):
     high = rig.board.HEIGHT_MAX_UM
@@ -85,6 +86,7 @@ def test_heights_for_another_number_of_bubbles_are_refused(rig):
 # Anything.
 
 
+@pytest.mark.promise("refused-not-applied")
 @pytest.mark.usefixtures("unchanged")
 def test_an_unknown_message_is_refused(rig):
     known = {message[0] for message in messages.MESSAGES if message[0] | messages.REPLY in codec.BY_ID}
@@ -92,6 +94,7 @@ def test_an_unknown_message_is_refused(rig):
         assert raw(rig, message_id, b"12")[:4] == (errors.UNKNOWN_MESSAGE, 0, WHOLE, message_id)
 
 
+@pytest.mark.promise("refused-not-applied")
 @pytest.mark.usefixtures("unchanged")
 def test_a_payload_of_the_wrong_length_is_refused(rig):
     for message in codec.BY_ID.values():
@@ -328,6 +331,7 @@ FLAWS = [
 ]
 
 
+@pytest.mark.promise("uploads-raise-no-limit")
 @pytest.mark.usefixtures("unchanged")
 @pytest.mark.parametrize(("table", "knot"), FLAWS)
 def test_a_table_with_a_flaw_is_not_taken(rig, table, knot):

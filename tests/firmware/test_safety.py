@@ -52,6 +52,7 @@ def go_wrong(rig, bubble, wrong, fault):
         rig.hal.counts[bubble] = wrong(rig)
 
 
+@pytest.mark.promise("pressure-limit", "isolation")
 @pytest.mark.parametrize(("wrong", "fault"), WRONG)
 def test_a_wrong_reading_isolates_its_bubble_within_two_ticks(rig, wrong, fault):
     hold(rig)
@@ -107,6 +108,7 @@ def test_readings_just_inside_the_range_are_believed(rig7):
         assert not rig7.state()["faults"].any()
 
 
+@pytest.mark.promise("fill-valve-time")
 def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
     """Bubble 0 wants more pressure than the reservoir has: its valve stays open, its count never rises."""
     board = rig.board
@@ -142,6 +144,7 @@ def test_a_fill_valve_open_too_long_isolates_its_bubble(rig):
     assert rig.app.safety.mode == modes.ACTIVE
 
 
+@pytest.mark.promise("fill-valve-time")
 @pytest.mark.parametrize("seed", range(4))
 def test_no_fill_valve_is_ever_open_for_longer_than_allowed(rig7, seed):
     """Sensors that lie at random, at times for seconds: the limit holds, and no tick fails."""
@@ -170,6 +173,7 @@ def test_no_fill_valve_is_ever_open_for_longer_than_allowed(rig7, seed):
     assert rig7.app.stats.exceptions == 0
 
 
+@pytest.mark.promise("clearing-disarms-nothing")
 @pytest.mark.parametrize(("wrong", "fault"), WRONG)
 def test_clearing_all_the_time_does_not_disarm_the_guard(rig7, wrong, fault):
     hold(rig7)
@@ -180,6 +184,7 @@ def test_clearing_all_the_time_does_not_disarm_the_guard(rig7, wrong, fault):
         assert vented(rig7, 0)
 
 
+@pytest.mark.promise("stop", "vent")
 def test_stop_closes_and_vent_opens_all_valves(rig):
     hold(rig)
     rig.show(14000)
@@ -208,6 +213,7 @@ def test_the_board_starts_vented(rig):
 # Exceptions.
 
 
+@pytest.mark.promise("failing-tick")
 @pytest.mark.parametrize("method", ["read_sensors", "write_outputs"])
 def test_an_exception_in_the_tick_vents(rig, method):
     hold(rig)
@@ -222,6 +228,7 @@ def test_an_exception_in_the_tick_vents(rig, method):
     assert all(vented(rig, bubble) for bubble in range(rig.board.BUBBLES)), "it goes on venting until the next SHOW"
 
 
+@pytest.mark.promise("failing-tick")
 @pytest.mark.parametrize("method", ["read_sensors", "write_outputs"])
 def test_a_board_that_fails_in_every_tick_still_answers(rig7, method):
     """So that one can ask what is wrong with it; and however often it is asked for a shape, it vents."""

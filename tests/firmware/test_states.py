@@ -40,6 +40,7 @@ def vented(rig):
 EVENTS = range(safety.CLEAR + 1)
 
 
+@pytest.mark.promise("states")
 @given(st.lists(st.sampled_from(EVENTS), max_size=40))
 def test_whatever_happens_the_emergency_stop_wins_and_a_fault_is_cleared_before_a_show(events):
     class Board:
@@ -68,6 +69,7 @@ THINGS = st.one_of(
 )
 
 
+@pytest.mark.promise("states")
 @pytest.mark.medium
 @settings(max_examples=25)
 @given(things=st.lists(THINGS, max_size=20))
@@ -102,6 +104,7 @@ def test_the_firmware_is_never_active_while_a_venting_fault_stands(new_rig, thin
     assert rig.app.stats.exceptions == 0
 
 
+@pytest.mark.promise("states")
 def test_boot_idle_active_venting_idle(rig):
     assert rig.app.safety.mode == BOOT
     rig.tick()
@@ -120,6 +123,7 @@ def test_boot_idle_active_venting_idle(rig):
 # The deadman.
 
 
+@pytest.mark.promise("silence")
 @pytest.mark.parametrize("moving", [True, False])
 def test_a_silent_host_holds_what_moves_and_then_vents_to_the_tick(rig, moving):
     board = rig.board
@@ -159,6 +163,7 @@ def test_a_host_that_speaks_is_not_silent(rig7):
     assert rig7.app.safety.mode == MODE_VENTING
 
 
+@pytest.mark.promise("silence")
 @pytest.mark.parametrize("greeting", ["no protocol in common", "no session", "a session that is over"])
 def test_a_host_that_is_refused_keeps_nothing_alive(rig7, greeting):
     rig7.open(SESSION + 1)
@@ -183,6 +188,7 @@ def test_a_host_that_has_a_session_keeps_alive_by_its_greeting_too(rig7):
     assert rig7.app.safety.mode == ACTIVE
 
 
+@pytest.mark.promise("silence")
 def test_held_by_stop_it_vents_when_the_host_is_silent(rig7):
     hold(rig7)
     rig7.ask("STOP")
@@ -195,6 +201,7 @@ def test_held_by_stop_it_vents_when_the_host_is_silent(rig7):
 # Settings.
 
 
+@pytest.mark.promise("deadman-stays")
 def test_settings_are_kept_within_the_boards_limits(rig7):
     read = rig7.ask("SETTING_READ").columns
     for number, low, high in zip(read["setting"].tolist(), read["low"].tolist(), read["high"].tolist(), strict=True):
@@ -215,6 +222,7 @@ def test_settings_are_kept_within_the_boards_limits(rig7):
     assert rig7.app.safety.mode == MODE_VENTING
 
 
+@pytest.mark.promise("budget")
 def test_the_budget_vents_a_bubble_and_lets_it_recover(rig7):
     rig7.ask("SETTING_WRITE", (), [(BUDGET_KPA_S, 60)])
     hold(rig7)
@@ -237,6 +245,7 @@ def test_the_budget_vents_a_bubble_and_lets_it_recover(rig7):
 # The log.
 
 
+@pytest.mark.promise("fault-stays")
 def test_what_comes_after_the_entry_acknowledged_stays(rig7):
     hold(rig7)
     rig7.hal.counts[0] = 0
@@ -253,6 +262,7 @@ def test_what_comes_after_the_entry_acknowledged_stays(rig7):
     assert log.columns["bubble"].tolist()[0] == 1
 
 
+@pytest.mark.promise("fault-stays")
 def test_the_log_keeps_the_last_sixteen(rig7):
     for tick in range(40):
         rig7.app.faults.log.add(tick, 1, 0, tick)
@@ -280,6 +290,7 @@ def test_device_time_wraps_before_integers_become_long(rig7):
     assert rig7.app.clock.ticks == 1
 
 
+@pytest.mark.promise("stuck-fill-valve")
 def test_an_overfilled_bubble_vents_all_and_empties_the_reservoir(rig7):
     hold(rig7)
     rig7.ask("VENT")
@@ -296,6 +307,7 @@ def test_an_overfilled_bubble_vents_all_and_empties_the_reservoir(rig7):
     assert rig7.refused("SHOW", (0,), [(9000,)] * 7)[0] == errors.BOARD_FAULT
 
 
+@pytest.mark.promise("supply-below-bubble")
 def test_no_fill_valve_opens_to_a_supply_below_the_bubble(rig7):
     hold(rig7)
     rig7.supply(20000)

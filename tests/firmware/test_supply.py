@@ -29,6 +29,7 @@ def seconds(rig, ticks):
     return ticks * rig.board.TICK_US * 1e-6
 
 
+@pytest.mark.promise("supply-lost")
 def test_a_supply_that_is_lost_vents_everything_within_the_tick(rig):
     rig.tick(5)
     rig.show(9000)
@@ -41,6 +42,7 @@ def test_a_supply_that_is_lost_vents_everything_within_the_tick(rig):
     assert error == errors.BOARD_FAULT
 
 
+@pytest.mark.promise("supply-lost")
 def test_while_the_supply_is_lost_the_pump_stands_and_the_reservoir_is_emptied(rig):
     rig.tick(5)
     rig.hal.counts[-1] = 9
@@ -86,6 +88,7 @@ WRONG = [
 ]
 
 
+@pytest.mark.promise("supply-lost")
 @pytest.mark.parametrize(("count", "most"), WRONG)
 def test_what_the_supply_sensor_cannot_say_is_not_believed(rig, count, most):
     rig.tick(5)
@@ -115,6 +118,7 @@ def test_a_supply_sensor_that_repeats_itself_is_not_believed(rig):
     assert rig.board.FROZEN_US - ticks_until_lost(rig, 1000) * rig.board.TICK_US in range(10 * rig.board.TICK_US)
 
 
+@pytest.mark.promise("supply-lost")
 def test_a_pump_whose_work_does_not_show_is_stopped(rig):
     rig.tick(5)
     rig.supply(50000)
@@ -159,21 +163,29 @@ def lied_to(attack, fault, value, pace, relief):
     return attacked
 
 
+@pytest.mark.promise("reservoir-limit")
 @pytest.mark.medium
 @pytest.mark.parametrize("pace", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize(("fault", "value"), LIES)
-def test_a_supply_sensor_that_lies_moves_no_pressure_beyond_the_dump_limit(attack, fault, value, pace):
+def test_a_supply_sensor_that_lies_moves_no_pressure_beyond_the_dump_limit(attack, fault, value, pace, record_property):
     attacked = lied_to(attack, fault, value, pace, relief=False)
     limits = attacked.board.data
+    record_property("true pressure of the reservoir, kPa (at most 75)", attacked.supply_pa / 1e3)
     assert attacked.supply_pa <= limits.SUPPLY_MAX_PA
     assert attacked.pressure_pa.max() <= limits.PRESSURE_MAX_PA
     assert attacked.app.faults.log.newest > 0
 
 
+@pytest.mark.promise("relief-valve")
 @pytest.mark.medium
 @pytest.mark.parametrize(("relief", "most"), [(True, 80e3 + RELIEF_MARGIN), (False, 90e3)])
 @pytest.mark.parametrize(("fault", "value"), SUBTLE)
-def test_a_lie_that_nothing_tells_from_the_truth_is_what_the_relief_valve_is_for(attack, fault, value, relief, most):
+def test_a_lie_that_nothing_tells_from_the_truth_is_what_the_relief_valve_is_for(
+    attack, fault, value, relief, most, record_property
+):
     attacked = lied_to(attack, fault, value, 1.0, relief)
+    record_property(
+        f"reservoir with{'' if relief else 'out'} relief valve, kPa (at most {most / 1e3:g})", attacked.supply_pa / 1e3
+    )
     assert attacked.supply_pa <= most
     assert attacked.pressure_pa.max() <= attacked.board.data.PRESSURE_MAX_PA

@@ -123,6 +123,7 @@ def assert_the_same(one, other):
         assert pair[0] == pair[1], tick
 
 
+@pytest.mark.promise("time-wraps")
 @pytest.mark.parametrize("left", ENDS)
 def test_a_sequence_goes_on_across_the_end_of_device_time(counts, left):
     """`left` ticks after boot device time ends: before the start, in it, in ramps, waits and a pause."""
@@ -131,6 +132,7 @@ def test_a_sequence_goes_on_across_the_end_of_device_time(counts, left):
     assert_the_same(ever, play(InProcessFirmware(BOARD, BOOT_ID, boot_ticks=before), counts, before))
 
 
+@pytest.mark.promise("time-wraps")
 @pytest.mark.medium
 @pytest.mark.usefixtures("micropython")  # to be skipped or to fail where there is none
 @pytest.mark.parametrize("left", [0, START, 130, 300])
@@ -156,6 +158,7 @@ def test_a_start_is_soonest_or_late_across_the_end_of_device_time(seven, left):
     seven.until_ended(200)
 
 
+@pytest.mark.promise("time-wraps")
 @pytest.mark.parametrize("left", [0, 1, 5, 100])
 def test_an_isolation_lasts_as_long_across_the_end_of_device_time(rig7, left):
     rig7.tick(5)
@@ -202,6 +205,7 @@ def held(left):
     return decided
 
 
+@pytest.mark.promise("time-wraps")
 @pytest.mark.parametrize("left", [0, 100, 300, 500])
 def test_heights_are_held_across_the_end_of_controls_time(left):
     assert held(left) == held(LATEST // 2)

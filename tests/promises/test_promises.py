@@ -14,11 +14,31 @@ SHARES = 8
 FEW = 5
 
 
+@pytest.mark.promise(
+    "pressure-limit",
+    "height-limit",
+    "reservoir-limit",
+    "silence",
+    "emergency-stop",
+    "fill-valve-time",
+    "isolation",
+    "fault-stays",
+)
 @pytest.mark.medium
 def test_promises_are_kept(look):
     look(FEW)
 
 
+@pytest.mark.promise(
+    "pressure-limit",
+    "height-limit",
+    "reservoir-limit",
+    "silence",
+    "emergency-stop",
+    "fill-valve-time",
+    "isolation",
+    "fault-stays",
+)
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("share", range(1, SHARES + 1))
@@ -29,6 +49,7 @@ def test_promises_are_kept_for_long(share, look):
 OVERFILLED = 128
 
 
+@pytest.mark.promise("stuck-fill-valve")
 @pytest.mark.medium
 @pytest.mark.parametrize("board", ["wristband7", "wristband19"])
 @pytest.mark.parametrize("ramp_ms", [0, 500])
@@ -65,6 +86,7 @@ def test_a_reservoir_that_fills_meanwhile_takes_no_bubble_too_high(board, world)
 LOW = [("supply_bias", -5e3), ("supply_bias", -8e3)]
 
 
+@pytest.mark.promise("height-limit")
 @pytest.mark.medium
 @pytest.mark.parametrize("lie", [("supply_flat", 50e3), ("supply_flat", 55e3), ("supply_flat", 58e3), *LOW])
 def test_a_reservoir_whose_sensor_lies_takes_no_bubble_too_high(lie, world):
@@ -127,6 +149,7 @@ def test_a_fault_that_goes_by_itself_is_found(ticks, world):
         world.judge_faults(well, vented)
 
 
+@pytest.mark.promise("height-limit")
 @pytest.mark.medium
 @pytest.mark.parametrize("seed", [1, 2, 236])
 @pytest.mark.parametrize("leak", [1e-6, 2e-6, 3e-6, 4e-6])

@@ -31,6 +31,7 @@ def tool(name):
 soak = tool("soak")
 
 
+@pytest.mark.promise("exactly-once")
 @pytest.mark.medium
 @pytest.mark.parametrize("commands", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_thousands_of_commands_over_a_line_that_fails(commands):

@@ -44,6 +44,7 @@ def test_in_virtual_time_a_host_that_stops_is_noticed_to_the_tick():
         assert skin.show(np.full(7, 9.0)).mode == "active", "it goes on"
 
 
+@pytest.mark.promise("silence")
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_a_killed_process_is_noticed():

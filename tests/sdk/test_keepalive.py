@@ -48,6 +48,7 @@ def keepers():
     return [thread for thread in threading.enumerate() if thread.name == "bubbleskin keep-alive"]
 
 
+@pytest.mark.promise("kept-alive")
 @pytest.mark.medium
 @pytest.mark.parametrize("event_loop", [False, True])
 def test_as_virtual_time_passes(event_loop):
@@ -75,6 +76,7 @@ def test_as_virtual_time_passes(event_loop):
     assert not keepers(), "no thread where time is virtual"
 
 
+@pytest.mark.promise("kept-alive")
 @pytest.mark.medium
 def test_while_a_script_thinks(served_port):
     with bs.connect(served_port.name) as skin:

@@ -81,6 +81,7 @@ def test_tables_arrive_over_a_bad_line(tapped):
     assert all(read.to_bytes() == table.to_bytes() for read in skin.read_tables())
 
 
+@pytest.mark.promise("silent-device")
 def test_nothing_gets_through_and_the_call_ends_in_time(tapped):
     on, change = switched(lambda data: b"")
     skin, tap = tapped(change=change, timeout=1.0)
@@ -146,6 +147,7 @@ def test_the_answer_to_another_question_is_no_answer(scripted):
         run_sync(Link(scripted(answer), 1.0).call("INFO"))
 
 
+@pytest.mark.promise("no-frame")
 def test_a_half_frame_on_the_line_does_not_spoil_the_greeting(tapped):
     skin, _ = tapped()
     skin.simulated.to_device += b"\x07half a frame"

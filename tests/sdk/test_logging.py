@@ -95,6 +95,7 @@ def test_a_port_that_goes_and_comes_back_is_told(caplog):
     assert told(caplog, logging.INFO, "here is back")
 
 
+@pytest.mark.promise("log")
 def test_nothing_is_formatted_when_nobody_wants_it(tapped, monkeypatch):
     skin, _ = tapped()
     monkeypatch.setattr(logging.Logger, "_log", lambda *_, **__: pytest.fail("logged"))

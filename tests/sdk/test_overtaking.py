@@ -25,6 +25,7 @@ def journal(board):
     return applied
 
 
+@pytest.mark.promise("overtaking")
 @pytest.mark.parametrize("urgent", ["stop", "vent"])
 @pytest.mark.parametrize("seed", range(4))
 def test_overtaken_or_applied_and_nothing_after(urgent, seed):
@@ -68,6 +69,7 @@ def test_in_one_batch():
     assert applied == [8000]
 
 
+@pytest.mark.promise("cancelled")
 @pytest.mark.parametrize("before", range(0, 60, 7))
 def test_a_cancelled_call_leaves_no_gap(before):
     """Cancelled before it was sent it never is; after that it is seen through, so that the window stays open."""

@@ -94,6 +94,7 @@ def soon(*steps):
     return thread
 
 
+@pytest.mark.promise("cable")
 @pytest.mark.medium
 def test_pulled_and_put_back_between_two_calls(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
@@ -111,6 +112,7 @@ def patient(skin):
     skin.configure(deadman_hold=5.0, deadman_vent=5.0)
 
 
+@pytest.mark.promise("cable")
 @pytest.mark.medium
 def test_pulled_and_put_back_during_show(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
@@ -148,6 +150,7 @@ def test_pulled_and_put_back_during_telemetry_and_an_upload(cable):
         assert all(read.to_bytes() == table.to_bytes() for read in skin.read_tables())
 
 
+@pytest.mark.promise("cable")
 @pytest.mark.medium
 def test_pulled_for_good_raises_in_time(cable):
     with bs.connect(cable.name, timeout=1.5) as skin:
@@ -160,6 +163,7 @@ def test_pulled_for_good_raises_in_time(cable):
         assert skin.state().mode == "idle", "and it connects again by itself"
 
 
+@pytest.mark.promise("restart-told")
 @pytest.mark.medium
 def test_a_restart_is_told_and_nothing_is_sent_again(cable):
     with bs.connect(cable.name, timeout=TIMEOUT) as skin:
@@ -190,6 +194,7 @@ def test_telemetry_goes_on_after_a_restart(cable, tmp_path):
         assert recording.lost < 20
 
 
+@pytest.mark.promise("one-program")
 @pytest.mark.medium
 def test_another_program_takes_the_wristband(cable):
     """On a line that two can write to: the first is told so, and takes it back with its next call."""

@@ -56,6 +56,7 @@ def test_show_of_the_wrong_count(skin, count):
     refused(skin, f"refused SHOW: {count} entries for its 7 bubbles", "SHOW", (0,), [(6000,)] * count)
 
 
+@pytest.mark.promise("refused-not-applied", "height-refused")
 @pytest.mark.medium
 @pytest.mark.parametrize("bubble", [0, 6])
 @pytest.mark.parametrize("height_um", [14001, 32768, 65535])

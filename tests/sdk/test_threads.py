@@ -2,11 +2,14 @@
 
 import threading
 
+import pytest
+
 import bubbleskin as bs
 
 THREADS, CALLS = 6, 60
 
 
+@pytest.mark.promise("threads")
 def test_threads_take_turns_with_one_simulated_skin():
     problems = []
     states = []

@@ -26,6 +26,7 @@ def in_use(skin):
 STRAIGHT = bs.Table([5000, 14000], [0, 36000])
 
 
+@pytest.mark.promise("no-false-rubber")
 def test_a_table_that_is_none_of_rubber_is_refused(skin):
     before = in_use(skin)
     with pytest.raises(
@@ -39,6 +40,7 @@ def test_a_table_that_is_none_of_rubber_is_refused(skin):
     assert in_use(skin) != before
 
 
+@pytest.mark.promise("no-false-rubber")
 def test_tables_that_contradict_each_other_are_refused(skin):
     with pytest.raises(bs.InvalidInput, match=r"contradict each other: bubble 6 has .* factor of 1\.5"):
         skin.upload_tables([scaled(1.0)] * 6 + [scaled(0.6)])
@@ -52,6 +54,7 @@ def test_tables_of_every_known_material_are_taken(name, skin):
     assert skin.read_tables() == [table] * 7
 
 
+@pytest.mark.promise("uploads-raise-no-limit")
 def test_what_the_device_bounds_is_bounded_anyway(skin):
     before = in_use(skin)
     with pytest.raises(bs.DeviceRefused, match="greatest height, where pressure may be"):
@@ -59,6 +62,7 @@ def test_what_the_device_bounds_is_bounded_anyway(skin):
     assert in_use(skin) == before
 
 
+@pytest.mark.promise("no-false-rubber")
 def test_a_trim_that_contradicts_itself_is_refused(skin):
     trim = skin.trim()
     for share in (0.25, 0.7, 1.4):

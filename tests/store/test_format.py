@@ -52,6 +52,7 @@ def test_the_newer_one_is_used_over_the_wrap(kit, first, second, newer):
     assert device.store.generation == (first, second)[newer]
 
 
+@pytest.mark.promise("store-told")
 def test_nothing_stored_is_factory(kit):
     device = kit.Device(NorFlash())
     assert device.store.source == store.FACTORY
@@ -76,6 +77,7 @@ def test_a_bit_lost_anywhere_is_noticed(kit, good):
             assert kit.Device(flash).store.states[good] == store.SLOT_VALID, "the good one has not been touched"
 
 
+@pytest.mark.promise("store-versions")
 def test_a_newer_schema_is_left_alone_until_a_reset(kit):
     old, older = some_record(kit, 10, 1)
     _, newer = some_record(kit, 20, 2, schema=record.SCHEMA + 1)
@@ -96,6 +98,7 @@ def test_a_newer_schema_is_left_alone_until_a_reset(kit):
         assert device.store.save()
 
 
+@pytest.mark.promise("store-versions")
 def test_another_boards_record_is_left_alone(kit):
     _, other = some_record(kit, 10, 1, name="wristband19")
     device = kit.Device(kit.flash_with(b"", other))
@@ -104,6 +107,7 @@ def test_another_boards_record_is_left_alone(kit):
     assert not device.store.save()
 
 
+@pytest.mark.promise("store-versions")
 def test_an_older_schema_lacks_what_has_been_added_since(kit):
     device = kit.Device(None)
     tables, trim, settings = device.change(10)
@@ -128,6 +132,7 @@ def test_an_older_schema_lacks_what_has_been_added_since(kit):
         assert (again.content, again.store.schema, again.store.generation) == (expected, record.SCHEMA, 10)
 
 
+@pytest.mark.promise("store-limits")
 def test_what_the_board_does_not_allow_is_not_used(kit):
     device = kit.Device(None)
     tables, trim, settings = device.change(10)
@@ -173,6 +178,7 @@ def test_sections_that_lie_about_their_length_are_not_used(kit):
         assert kit.Device(kit.flash_with(head + whole[40:])).store.source == store.DAMAGED
 
 
+@pytest.mark.promise("no-needless-wear")
 def test_what_is_saved_already_is_not_written_again(kit):
     flash = NorFlash()
     device = kit.Device(flash)
@@ -184,6 +190,7 @@ def test_what_is_saved_already_is_not_written_again(kit):
     assert sum(flash.erases) == 2
 
 
+@pytest.mark.promise("no-needless-wear")
 @pytest.mark.medium
 def test_wear_is_what_the_chip_counts(kit):
     flash = NorFlash()

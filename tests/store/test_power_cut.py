@@ -140,6 +140,7 @@ def reset(device):
 MORE = [(3, 1), (2, 65534), (2, 65535)]
 
 
+@pytest.mark.promise("whole-or-old")
 @pytest.mark.medium
 @pytest.mark.parametrize(
     ("saves", "generation"),
@@ -152,6 +153,7 @@ def test_a_save_cut_short_leaves_old_or_new(kit, saves, generation):
     assert count["new"] >= 1, "a cut after the last bit of the header"
 
 
+@pytest.mark.promise("whole-or-old")
 @pytest.mark.medium
 @pytest.mark.parametrize("saves", [1, 2])
 def test_a_reset_cut_short_leaves_old_or_factory(kit, saves):
@@ -161,6 +163,7 @@ def test_a_reset_cut_short_leaves_old_or_factory(kit, saves):
     assert count["new"] > 10, "whatever is cut of the second slot"
 
 
+@pytest.mark.promise("whole-or-old")
 @pytest.mark.slow
 @pytest.mark.parametrize(("saves", "generation"), [(0, 1), (1, 1), (2, 65535)])
 def test_at_every_byte_and_bit_of_every_page(kit, saves, generation):

@@ -35,6 +35,7 @@ def lose_power(skin):
 TABLE = bs.Table([4000, 9000, 14000], [0, 21000, 35000])
 
 
+@pytest.mark.promise("saved-stays")
 def test_what_is_saved_is_there_after_a_power_cut_and_what_is_not_is_not(skin):
     factory = skin.read_tables()
     assert skin.health().store == skin.stored().source == "factory"
@@ -68,6 +69,7 @@ def test_power_may_fail_while_the_host_waits():
         skin.upload_tables(TABLE, save=True)
 
 
+@pytest.mark.promise("vented-only")
 @pytest.mark.parametrize("ask", [bs.Skin.save, bs.Skin.factory_reset, lambda skin: skin.upload_trim(skin.trim())])
 def test_only_while_vented(skin, ask):
     flash = skin.simulated.firmware.flash
@@ -82,6 +84,7 @@ def test_only_while_vented(skin, ask):
     ask(skin)
 
 
+@pytest.mark.promise("vented-only")
 def test_a_save_leaves_the_valves_safe_and_the_next_show_works(skin):
     skin.save()
     assert (skin.simulated.pulses == [0.0, skin.info.tick]).all()
@@ -90,6 +93,7 @@ def test_a_save_leaves_the_valves_safe_and_the_next_show_works(skin):
     assert skin.health().exceptions == 0
 
 
+@pytest.mark.promise("store-told")
 def test_both_slots_bad_is_said():
     flash = NorFlash()
     skin = open_board(flash=flash)
@@ -107,6 +111,7 @@ def test_both_slots_bad_is_said():
     assert skin.health().store == "slot_a"
 
 
+@pytest.mark.promise("store-told", "store-versions")
 def test_refusals_are_sentences():
     flash = NorFlash()
     open_board(flash=flash).save()

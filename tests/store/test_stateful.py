@@ -135,6 +135,7 @@ def machine(kit):
     return type("StoreMachine", (StoreMachine,), {"kit": kit})
 
 
+@pytest.mark.promise("whole-or-old")
 @pytest.mark.medium
 @pytest.mark.parametrize("examples", [10, pytest.param(200, marks=pytest.mark.slow)])
 def test_any_history_leaves_one_whole_record(kit, examples):

@@ -76,6 +76,7 @@ def flat(skin):
         skin.clear_faults()
 
 
+@pytest.mark.promise("height-neighbours")
 @pytest.mark.parametrize(
     "asked",
     [np.full(7, 12.0), np.full(7, 14.0), [14.0, *[13.0] * 6], [13.9, *[11.88] * 6]],
@@ -98,6 +99,7 @@ def test_no_top_passes_the_limit_and_that_is_said(skin, asked, caplog):
     assert state.target_mm == pytest.approx(np.asarray(asked))
 
 
+@pytest.mark.promise("height-neighbours")
 @pytest.mark.slow
 def test_no_random_show_of_a_calibrated_wristband_passes_the_limit():
     """Of sheets and springs that differ, ideal and real rubber: heights that mostly cannot be had, one after the other."""

@@ -33,3 +33,7 @@ def no_number(skin, random):
 def dies(skin, random):
     """As one that the system kills."""
     os._exit(9)
+
+
+def nothing(skin, random):
+    """Forgot to return."""

@@ -67,7 +67,7 @@ def hil(
         arguments += ["--target", device]
     arguments += ["-k", only] if only else []
     arguments += [f"--html={html}", "--self-contained-html"] if html else []
-    arguments += [f"--junit-xml={junit}"] if junit else []
+    arguments += [f"--junit-xml={junit}", "-o", "junit_family=xunit1"] if junit else []  # with figures of tests
     arguments += ["--permit-failures"] if failures else []
     arguments += ["--collect-only", "-q"] if names else []
     raise SystemExit(pytest.main(arguments))

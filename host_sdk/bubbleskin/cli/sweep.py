@@ -1,8 +1,10 @@
 """`bubbleskin sweep`: a study's task on many simulated wristbands."""
 
 import json as jsonlib
+import logging
+import sys
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -42,6 +44,8 @@ def sweep(
 
     if workers and scheduler:
         raise InvalidInput("--workers are processes of this computer, --scheduler has its own; give one of them.")
+    if "" not in sys.path:
+        sys.path.insert(0, "")  # a task of the folder that one is in; a script that is installed has only its own
     asked = Study.load(study)
     with _executor(workers, scheduler) as executor, progress_of_parts(Console(stderr=True)) as bar:
         task = bar.add_task(asked.name, total=None)
@@ -52,10 +56,13 @@ def sweep(
     if json:
         click.echo(jsonlib.dumps({"name": asked.name, "rows": rows, "figures": describe(rows)}, indent=2))
     else:
-        table = Table("figure", "mean", "median", "most", title=f"{asked.name}: {len(rows)} wristbands")
+        table = Table(
+            "figure", "mean", "median", "most", title=f"{asked.name}: {len(rows)} wristband{'s' * (len(rows) != 1)}"
+        )
         for name, figures in describe(rows).items():
             table.add_row(name, *(f"{figures[kind]:.4g}" for kind in ("mean", "median", "most")))
-        Console().print(table)
+        if table.rows:
+            Console().print(table)
         for row in failed[:3]:
             click.echo(f"Point {row['point']}: {row['error']}", err=True)
         if failed:
@@ -78,7 +85,9 @@ def _executor(workers: int | None, scheduler: str | None) -> Iterator[Executor |
         with _dask(scheduler) as executor:
             yield executor
     elif workers:
-        with ProcessPoolExecutor(workers) as executor:
+        from bubbleskin.sweeps.workers import processes
+
+        with processes(workers) as executor:
             yield executor
     else:
         yield None
@@ -96,6 +105,10 @@ def _dask(address: str) -> Iterator[Executor]:
         raise BubbleskinError(
             f"No Dask scheduler answers at {address}: {error}. Start one with `dask scheduler`."
         ) from None
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(
+            logging.CRITICAL
+        )  # that its scheduler has gone it says with tracebacks, after we have
     with client:
         yield client.get_executor()
 

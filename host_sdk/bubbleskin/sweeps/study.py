@@ -12,6 +12,8 @@ from urllib.parse import quote, urlencode
 from bubbleskin import boards, checks
 from bubbleskin.errors import InvalidInput
 from bubbleskin.files import parse_toml, read_text
+from bubbleskin.sim.options import Options
+from bubbleskin.sim.recipe import make_parameters
 
 Value = str | int | float | bool
 SEEDS_MAX = 100_000
@@ -54,6 +56,7 @@ class Study:
     @classmethod
     def of(cls, said: Mapping[str, Any], where: str = "The study") -> Self:
         """From what a file says: `task`, and where it differs `board`, `target`, `seeds`, `name`, `[plant]`, `[options]`."""
+        of = f"{where[0].lower()}{where[1:]}"  # within a sentence
         for key in said:
             if key not in _KEYS:
                 raise InvalidInput(f"{where} has {checks.shown(key)}; known are {', '.join(_KEYS)}.")
@@ -66,23 +69,26 @@ class Study:
             several = value if isinstance(value, list | tuple) else [value]
             if not several:
                 raise InvalidInput(f"{where} has no value for {name} in [plant]; give one or several.")
-            plant[name] = tuple(_value(f"{name} in [plant] of {where}", each) for each in several)
+            plant[name] = tuple(_value(f"{name} in [plant] of {of}", each) for each in several)
         if "seed" in plant:
             raise InvalidInput(f"{where} has seed in [plant]; say how many there are instead: seeds = 50.")
         study = cls(
-            task=checks.text(f"The task of {where}", said["task"]),
-            board=checks.text(f"The board of {where}", said.get("board", boards.DEFAULT)),
+            task=checks.text(f"The task of {of}", said["task"]),
+            board=checks.text(f"The board of {of}", said.get("board", boards.DEFAULT)),
             target=said.get("target", "sim"),
-            seeds=checks.whole(f"The seeds of {where}", said.get("seeds", 1), 1, SEEDS_MAX),
+            seeds=checks.whole(f"The seeds of {of}", said.get("seeds", 1), 1, SEEDS_MAX),
             plant=plant,
             options={
-                name: _value(f"{name} in [options] of {where}", value)
+                name: _value(f"{name} in [options] of {of}", value)
                 for name, value in _mapping(where, "options", said).items()
             },
-            name=checks.text(f"The name of {where}", said.get("name", "sweep")),
+            name=checks.text(f"The name of {of}", said.get("name", "sweep")),
         )
-        checks.one_of(f"The target of {where}", study.target, SCHEMES)
+        checks.one_of(f"The target of {of}", study.target, SCHEMES)
         boards.load(study.board)
+        for name, values in plant.items():
+            for value in values:
+                _check_option(study.target, name, value, f"[plant] of {of}")
         combinations = 1
         for values in plant.values():
             combinations *= len(values)
@@ -97,7 +103,7 @@ class Study:
         for values in product(*self.plant.values()):
             for seed in range(self.seeds):
                 options = dict(zip(names, values, strict=True)) | {"seed": seed}
-                said = {name: int(value) if isinstance(value, bool) else value for name, value in options.items()}
+                said = {name: _in_a_url(value) for name, value in options.items()}
                 url = f"{self.target}://{quote(self.board)}?{urlencode(said)}"
                 varied = {name: value for name, value in options.items() if name == "seed" or len(self.plant[name]) > 1}
                 found.append(Point(len(found), url, varied))
@@ -108,6 +114,17 @@ class Study:
         """Says whether rows that were kept are of this study."""
         said = [self.task, self.board, self.target, self.seeds, dict(self.plant), dict(self.options)]
         return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _in_a_url(value: Value) -> Value:
+    return int(value) if isinstance(value, bool) else value
+
+
+def _check_option(target: str, name: str, value: Value, where: str) -> None:
+    """`InvalidInput` where no wristband can have this, before the first of thousands is made."""
+    asked = Options.parse({name: str(_in_a_url(value))}, f"{target}:// in {where}")
+    if name != "plant":  # a file that the workers have
+        make_parameters(1, 0, asked.spread, **asked.plant)
 
 
 def _mapping(where: str, name: str, said: Mapping[str, Any]) -> Mapping[str, Any]:

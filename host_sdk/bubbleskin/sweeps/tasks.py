@@ -1,8 +1,9 @@
 """What can be asked of each wristband of a sweep: tasks by name, and how one of your own is found."""
 
 import importlib
+import inspect
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,14 +85,27 @@ def task_of(name: str) -> Task:
         raise InvalidInput(f"There is no task {name!r}; there are {', '.join(TASKS)}, or yours as 'module:function'.")
     try:
         found = getattr(importlib.import_module(module), function)
-    except ImportError as error:
+    except AttributeError as error:
+        if error.name == function:
+            raise InvalidInput(f"The module {module} has no {function!r}.") from None
         raise InvalidInput(f"The task {name!r} cannot be imported: {error}.") from None
-    except AttributeError:
-        raise InvalidInput(f"The module {module} has no {function!r}.") from None
+    except Exception as error:  # a module of one's own may fail in any way
+        raise InvalidInput(f"The task {name!r} cannot be imported: {error}.") from None
     if not callable(found):
         raise InvalidInput(f"The task {name!r} is no function: {checks.shown(found)}.")
     task: Task = found
     return task
+
+
+def check_options(name: str, options: Mapping[str, Any]) -> None:
+    """`InvalidInput` where there is no such task, or it does not take these options."""
+    task = task_of(name)
+    try:
+        inspect.signature(task).bind(None, None, **options)
+    except TypeError as error:
+        raise InvalidInput(f"The task {name} does not fit [options]: {error}.") from None
+    except ValueError:  # one that does not say what it takes
+        return
 
 
 def _simulated(skin: Skin) -> "Simulated":

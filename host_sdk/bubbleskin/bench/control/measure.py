@@ -12,6 +12,7 @@ from bubbleskin.bench.control.plants import KINDS, REAL, Kind
 from bubbleskin.bench.control.runs import HOLDS, LONG, SEARCH, STEP, TO_AND_FRO, Job, Outcome, run
 from bubbleskin.bench.control.shows import TIMES_S
 from bubbleskin.bench.rows import Row, share_of
+from bubbleskin.sweeps.workers import end_with_parent
 
 _SHEETS = {HOLDS: 4, LONG: 2, TO_AND_FRO: 4, STEP: 8, SEARCH: 100}
 """Of each kind at full size, a seed each."""
@@ -27,7 +28,7 @@ def figures(size: float = 1.0, seed: int = 1) -> Iterator[Figures]:
     ]
     # Fresh interpreters: one that was forked from threads may hang.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=context) as pool:
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=context, initializer=end_with_parent) as pool:
         waiting: list[list[Future[Outcome]]] = [[pool.submit(run, job) for job in jobs] for jobs in groups]
         for futures in waiting:
             yield Figures.of([future.result() for future in futures])
