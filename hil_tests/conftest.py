@@ -240,3 +240,9 @@ def pressed(skin: bs.Skin) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]
         return pairs.any(axis=1) & has_contact
 
     return touching
+
+
+@pytest.fixture
+def record_property(record_property):
+    """pytest's own, for numbers of numpy too: reports go from process to process in words that know none."""
+    return lambda name, value: record_property(name, float(value))

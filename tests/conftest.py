@@ -113,3 +113,9 @@ def micropython(tmp_path_factory):
         return done.stdout
 
     return run
+
+
+@pytest.fixture
+def record_property(record_property):
+    """pytest's own, for numbers of numpy too: reports go from process to process in words that know none."""
+    return lambda name, value: record_property(name, float(value))
