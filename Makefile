@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 GENERATORS := packed_schema constants nominal_table golden_vectors protocol_page cli_page boards_page wiring_page state_page fault_page plant_page demo_picture membrane_pictures contact_pictures control_page chip_profile control_pictures calibration_picture pattern_pictures
 EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
-QUICK := -n 2 -m "not medium and not slow and not chip" --ignore tests/house --ignore docs/calibration.md
+QUICK := -n 2 -m "not medium and not slow and not chip" --ignore tests/house --ignore docs/calibration.md --ignore docs/contact.md
 COVERED := tests/bench tests/boards tests/cli tests/contact tests/demonstrations tests/examples tests/flash tests/native tests/planner tests/plot tests/sdk tests/studio tests/sweeps
 UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
