@@ -89,6 +89,7 @@ class Shows:
         self._leg: _Leg | None = None  # of the last show, and whether its end has been seen
         self._seen = False
         self._looked: Array | None = None  # heights alone that were told on its way
+        self._taken_at = -np.inf  # device's time at which it took the heights of the last show, s
         self._said = -np.inf  # when a stream was last said to be short
 
     def opened(self, info: Info) -> None:
@@ -178,11 +179,12 @@ class Shows:
 
     async def _send(self, alone: Array, over: float) -> None:
         micrometres = np.rint(alone * 1000).astype(int).tolist()
-        await self._link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
+        reply = await self._link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
+        self._taken_at = reply["ticks"] * self._info.tick
 
     def _note(self, steps: list[Array], asked: Array | None) -> None:
         self._steps, self._asked, self._leg, self._seen = list(steps), asked, None, False
-        self._looked = None
+        self._looked, self._taken_at = None, -np.inf
         self._pressed.reach(np.max(steps, axis=0), self._link.transport.now())
 
     def _catch_up(self) -> None:
@@ -296,7 +298,7 @@ class Shows:
         while True:
             state = await self.look()
             await self._check(state)
-            if state.arrived:
+            if state.arrived and state.time > self._taken_at:  # else no tick has seen what was asked
                 return state
             if link.transport.now() >= deadline:
                 raise self._unsettled(state, patience)
