@@ -5,8 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 GENERATORS := packed_schema constants nominal_table golden_vectors protocol_page cli_page boards_page wiring_page state_page fault_page plant_page demo_picture membrane_pictures contact_pictures control_page chip_profile control_pictures calibration_picture pattern_pictures promises_page
-EVERYDAY := -n 2 -m "not slow and not chip" --ignore tests/house
-QUICK := -n 2 -m "not medium and not slow and not chip" --ignore tests/house --ignore docs/calibration.md
+EVERYDAY := -n 2 --dist worksteal -m "not slow and not chip" --ignore tests/house
+QUICK := -n 2 --dist worksteal -m "not medium and not slow and not chip" --ignore tests/house --ignore docs/calibration.md --ignore docs/contact.md
 COVERED := tests/bench tests/boards tests/cli tests/contact tests/demonstrations tests/examples tests/flash tests/native tests/planner tests/plot tests/sdk tests/studio tests/sweeps
 UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
@@ -35,7 +35,7 @@ test: setup lint generated micropython ## every check that needs no hardware, so
 	@echo "the everyday tests, 100 examples of each property; coverage, which makes them half as slow again, is of these"
 	$(BIN)/python -m pytest $(EVERYDAY) --cov --cov-report= --cov-fail-under=0
 	@echo "and of the slow tests of the SDK's rooms; its floor is one of both"
-	$(BIN)/python -m pytest -n 2 -m "slow and not chip" $(COVERED) --ignore $(UNCOVERED) --cov --cov-append --cov-report=term
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "slow and not chip" $(COVERED) --ignore $(UNCOVERED) --cov --cov-append --cov-report=term
 	@echo "what is left in memory, without coverage, which keeps some itself"
 	$(BIN)/python -m pytest -n 2 -m "slow and not chip" $(UNCOVERED)
 	@echo "the firmware's arithmetic as Python that raises where a result leaves 32 bits"

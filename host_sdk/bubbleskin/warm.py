@@ -4,7 +4,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from bubbleskin import boards
 from bubbleskin.layout import Layout
 
 
@@ -17,11 +16,10 @@ class Part(NamedTuple):
 
 def parts() -> list[Part]:
     """All that this computer compiles: simulated bubbles, the firmware's viper functions, and the model of contact."""
-    from bubbleskin.sim import SimulatedBoard, devices, jit, kernel
+    from bubbleskin.sim import devices, jit, kernel
     from bubbleskin.sim.real import kernel as real
 
-    jit.enable()
-    SimulatedBoard(boards.DEFAULT)  # which imports what there is of the firmware
+    jit.enable()  # importing simulated boards has brought all that there is of the firmware
     modules = [
         Part(f"firmware, {name.rpartition('.')[2]}", partial(jit.compile_module, name)) for name in jit.waiting()
     ]

@@ -136,6 +136,7 @@ def test_of_whatever_size_touching_bubbles_are_measured():
     assert all(np.isfinite(row.value) for row in rows)
 
 
+@pytest.mark.medium
 def test_the_page_shows_the_file_and_check_says_where_not(tmp_path):
     (tmp_path / "docs/data").mkdir(parents=True)
     for path in (page.PAGE, page.TOPS_PAGE):

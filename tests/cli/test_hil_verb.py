@@ -45,6 +45,7 @@ def test_a_failure_stands_beside_what_the_wristband_says(tmp_path):
     assert "<Health" in done.stdout
 
 
+@pytest.mark.medium
 def test_what_would_be_tried_is_listed(tmp_path):
     done = run("--list", "--only", "safety", cwd=tmp_path)
     assert done.returncode == 0

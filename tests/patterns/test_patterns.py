@@ -227,6 +227,7 @@ def test_nothing_but_patterns_is_understood(typed):
         parse(typed)
 
 
+@pytest.mark.medium
 @given(st.text(st.sampled_from("rwpns()., *+-019eE_lowx=\"'\\\n\t[]{}:#@é"), max_size=40) | st.text(max_size=40))
 def test_whatever_is_typed_is_a_pattern_or_a_sentence(typed):
     try:

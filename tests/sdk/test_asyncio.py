@@ -220,3 +220,20 @@ def test_connecting_can_be_given_up(port):
             await bs.aconnect(port.name, timeout=0.1)
 
     run(script(), seconds=5.0)
+
+
+def test_a_closed_port_is_watched_by_nobody(served_port):
+    """Its number may soon be another file's, which the loop would then not take."""
+
+    async def script():
+        skin = await bs.aconnect(served_port.name)
+        descriptor = skin.link.transport.descriptor
+        waiting = asyncio.create_task(skin.sleep(20.0))
+        await asyncio.sleep(0.05)
+        await skin.aclose()
+        assert not asyncio.get_running_loop().remove_reader(descriptor)
+        waiting.cancel()
+        with pytest.raises((asyncio.CancelledError, bs.LinkError)):
+            await waiting
+
+    run(script())

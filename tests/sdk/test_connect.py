@@ -316,6 +316,15 @@ def test_a_closed_skin_says_so(served):
 
 
 @pytest.mark.medium
+def test_a_show_is_not_over_before_a_tick_has_seen_it(served):
+    with bs.connect(served.name) as skin:  # between two ticks all bubbles rest where the last one has found them
+        for height in (9.5, 8.0, 9.0, 8.0, 9.0):
+            skin.show([height + 1] * 7, wait=False)
+            assert not skin.state().settled
+            assert skin.show([height] * 7).height_mm == pytest.approx(height, abs=0.2)
+
+
+@pytest.mark.medium
 def test_a_served_board_takes_shapes_in_real_time(served):
     with bs.connect(served.name) as skin:
         assert skin.simulated is None

@@ -5,7 +5,6 @@ import json
 import math
 
 import hypothesis.strategies as st
-import jsonschema
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -55,6 +54,8 @@ def sequences(draw):
 @settings(max_examples=25)
 @given(sequences())
 def test_json_comes_back_as_it_was_and_is_by_the_schema(sequence):
+    import jsonschema  # takes a second, which whoever collects tests would wait for
+
     text = sequence.to_json()
     assert bs.Sequence.from_json(text) == sequence
     jsonschema.validate(json.loads(text), SCHEMA_DATA)
@@ -79,11 +80,17 @@ def repeats(steps):
             yield from repeats(part.steps)
 
 
+@pytest.mark.medium
 def test_the_schema_is_one():
+    import jsonschema
+
     jsonschema.Draft202012Validator.check_schema(SCHEMA_DATA)
 
 
+@pytest.mark.medium
 def test_the_schemas_defaults_are_the_readers():
+    import jsonschema
+
     text = '{"bubbleskin_sequence": 1, "steps": [{"targets_mm": [6, null], "until": {"settled_mm": 0.2}}]}'
     jsonschema.validate(json.loads(text), SCHEMA_DATA)
     assert bs.Sequence.from_json(text) == bs.Sequence([bs.Step([6.0, None], until=bs.Settled())])

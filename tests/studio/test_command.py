@@ -97,6 +97,7 @@ def test_without_its_extra_it_says_what_to_install(command, monkeypatch):
     assert "pip install 'bubbleskin[studio]'" in err
 
 
+@pytest.mark.medium
 def test_the_core_knows_nothing_of_it():
     code = (
         "import sys, bubbleskin, bubbleskin.cli.command; bubbleskin.live;"

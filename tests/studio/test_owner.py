@@ -88,6 +88,7 @@ def test_the_end_vents(with_owner):
     assert np.all(board.height_mm < FLAT_MM)
 
 
+@pytest.mark.medium
 def test_where_nobody_looks_everything_vents(with_owner, monkeypatch):
     monkeypatch.setattr(owner_module, "GRACE_S", 0.2)
     there = [True]

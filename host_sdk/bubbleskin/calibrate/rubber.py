@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
 
@@ -64,6 +63,8 @@ def pressure(stretch: Floats, held: Floats, wall: Wall) -> Floats:
 
 def remembered(held: Floats, tick_s: float, wall: Wall) -> Floats:
     """What of the changes of tension so far has not faded, at each tick."""
+    from scipy.signal import lfilter  # takes a third of a second to import
+
     change = np.diff(held, prepend=held[0])
     left = np.zeros_like(held)
     for share, time in ((wall.quick, QUICK_S), (wall.slow, SLOW_S)):

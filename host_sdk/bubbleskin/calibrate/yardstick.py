@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
 
@@ -79,6 +78,8 @@ def _basis(draws: Sequence[Draw], bubbles: Sequence[int], threshold: float, heat
 
 def _response(flow: Floats, tick_s: float, heat_s: float) -> Floats:
     """Pressure at each reading, of what has flowed in the periods before."""
+    from scipy.signal import lfilter  # takes a third of a second to import
+
     before = np.concatenate([[0.0], flow[:-1]])
     kept = float(np.exp(-tick_s / heat_s))
     return np.asarray(np.cumsum(before) + _HEAT * lfilter([1.0], [1.0, -kept], before))

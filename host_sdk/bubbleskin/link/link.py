@@ -45,8 +45,7 @@ class Link(Serviced):
     """One device at the other end of `transport`, which answers every request within `timeout` s or is called silent.
 
     Everything is a coroutine. Without an event loop the transport is read in place and no coroutine ever
-    suspends, so that `run_sync` can run it. With one, other tasks have their turn while this one waits: a
-    transport that waits by the wall clock is read in a thread.
+    suspends, so that `run_sync` can run it. With one, other tasks have their turn while this one waits: see `Line`.
 
     `on_open(reply)` is called with the reply to HELLO whenever a session has been opened, and
     `on_ping(sent_at, reply, received_at)` with every reply to a PING and the transport's time at both ends, s,

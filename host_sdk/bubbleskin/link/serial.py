@@ -111,6 +111,11 @@ class SerialTransport(Transport):
             raise OSError("the other end has gone")
         return data
 
+    @property
+    def descriptor(self) -> int | None:
+        """See `Transport`."""
+        return None if self._waitable == -1 else self._waitable
+
     def _read_polling(self, timeout: float) -> bytes:
         until = self.now() + timeout
         while True:

@@ -37,6 +37,11 @@ class Transport(ABC):
         return  # a transport that holds no port has nothing to let go of
 
     @property
+    def descriptor(self) -> int | None:
+        """What an event loop can wait for in place of `read`; None where only `read` itself waits, or the port has gone."""
+        return None
+
+    @property
     def behind(self) -> float:
         """Seconds of `now` that reading has to catch up with, because nobody has read for a while."""
         return 0.0

@@ -1,27 +1,30 @@
-"""From numba's functions to one piece of native code. Imported only to compile: numba comes with it."""
+"""From LLVM's text, or numba's functions, to one piece of native code. Imported only to compile."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from llvmlite import binding as llvm
-from numba.core import types
 
 from bubbleskin.native import entry
+from bubbleskin.native.assembly import Assembly, Signature
 
-_RETURNS = {types.int64: "i64", types.float64: "double", types.none: ""}
 
-
-def native_code(functions: Mapping[str, Any]) -> bytes:
-    """An object file with an entry for each of these functions, which have one signature each; their names after it."""
+def native_code(made: Mapping[str, Any] | Assembly) -> bytes:
+    """An object file with an entry for each function; their names after it. numba's functions have one signature each."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
     whole = llvm.parse_assembly("")
-    entries = [entry.HEAD]
-    for name, function in functions.items():
-        ((signature, made),) = function.overloads.items()
-        symbol = made.fndesc.llvm_func_name
-        whole.link_in(_only(symbol, function.inspect_llvm(signature)))
-        kinds = ["ptr" if isinstance(kind, types.CPointer) else _RETURNS[kind] for kind in signature]
-        entries.append(entry.entry(name, symbol, kinds, _RETURNS[made.signature.return_type]))
-    whole.link_in(llvm.parse_assembly("\n".join(entries)))
+    if isinstance(made, Assembly):
+        signatures = made.functions
+        whole.link_in(llvm.parse_assembly(made.text))
+    else:
+        from bubbleskin.native import optimized  # with numba
+
+        signatures = {}
+        for name, function in made.items():
+            signatures[name], text = optimized.of(function)
+            whole.link_in(_only(signatures[name].symbol, text))
+    whole.link_in(llvm.parse_assembly(_entries(signatures)))
     for function in whole.functions:
         if not function.is_declaration and not function.name.startswith(entry.PREFIX):
             function.linkage = llvm.Linkage.internal
@@ -32,9 +35,16 @@ def native_code(functions: Mapping[str, Any]) -> bytes:
         jit=True,
         codemodel="jitdefault",
     )
-    _clean(whole, machine)
+    if isinstance(made, Assembly):
+        _optimize(whole, machine)
+    else:
+        _clean(whole, machine)
     _check(whole)
-    return machine.emit_object(whole) + b"\n" + " ".join(functions).encode()
+    return machine.emit_object(whole) + b"\n" + " ".join(signatures).encode()
+
+
+def _entries(signatures: Mapping[str, Signature]) -> str:
+    return "\n".join([entry.HEAD, *(entry.entry(name, signature) for name, signature in signatures.items())])
 
 
 def _check(module: llvm.ModuleRef) -> None:
@@ -59,9 +69,18 @@ def _only(symbol: str, text: str) -> llvm.ModuleRef:
 
 def _clean(module: llvm.ModuleRef, machine: llvm.TargetMachine | None) -> None:
     """Take out what nobody calls."""
-    options = llvm.create_pipeline_tuning_options(speed_level=3)
     machine = machine or llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine()
-    builder = llvm.create_pass_builder(machine, options)
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
-    passes.run(module, builder)
+    passes.run(module, _builder(machine))
+
+
+def _optimize(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """All that LLVM knows."""
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    builder = _builder(machine)
+    builder.getModulePassManager().run(module, builder)
+
+
+def _builder(machine: llvm.TargetMachine) -> llvm.PassBuilder:
+    return llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))

@@ -3,7 +3,7 @@
 This is CPython's METH_FASTCALL convention, without the look at types that numba's own way in takes at every call.
 """
 
-from collections.abc import Sequence
+from bubbleskin.native.assembly import Signature
 
 _OBJECTS = {"TypeError": TypeError, "ZeroDivisionError": ZeroDivisionError, "None": None}
 
@@ -41,11 +41,9 @@ define void @NRT_MemInfo_call_dtor(ptr %memory) {
 """
 
 
-def entry(name: str, symbol: str, kinds: Sequence[str], returns: str) -> str:
-    """The function `entry_NAME`. `symbol` is numba's: it takes places for result and exception, then `kinds`.
-
-    `kinds` and `returns` are LLVM's types i64, double and ptr; `returns` may be empty.
-    """
+def entry(name: str, signature: Signature) -> str:
+    """The function `entry_NAME`, which calls what `signature` describes."""
+    symbol, kinds, returns = signature
     said = f"{name} takes {len(kinds)} numbers"
     lines, arguments = [], []
     for k, kind in enumerate(kinds):

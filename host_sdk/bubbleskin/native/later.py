@@ -19,7 +19,7 @@ class Later:
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]):
         self._function = function
-        self._options = options
+        self._options = {"no_cfunc_wrapper": True, **options}  # nobody calls them from C
         self._made: Any = None
         self.__doc__ = function.__doc__
 

@@ -4,7 +4,7 @@ import sys
 
 _said: set[str] = set()
 
-COMPILING = "Compiling for this computer, once: about half a minute. `bubbleskin doctor --warm` does it ahead."
+COMPILING = "Compiling for this computer, once: some ten seconds. `bubbleskin doctor --warm` does it ahead."
 UNKEPT: list[str] = []
 """Why compiled code could not be kept, as often as that happened."""
 

@@ -16,6 +16,7 @@ from typing import Any
 import platformdirs
 from llvmlite import binding as llvm
 
+from bubbleskin.native.assembly import Assembly
 from bubbleskin.native.entry import OBJECTS, PREFIX
 from bubbleskin.native.said import say_compiling, say_unkept
 
@@ -23,14 +24,14 @@ _loaded: list[Any] = []  # engines and method tables: the functions live in them
 
 
 def load(
-    name: str, made_of: bytes, make: Callable[[], Mapping[str, Any]], *, unkept: bool = True
+    name: str, made_of: bytes, make: Callable[[], Mapping[str, Any] | Assembly], *, unkept: bool = True
 ) -> dict[str, Callable[..., Any]]:
     """The functions that `make` gives, by name, as native code.
 
-    `make` returns numba functions, each compiled for one signature of int64, float64 and pointers; it is called where the
-    cache folder has nothing that was made of the same: `made_of` is all of the source. The versions of Python, numba and
-    llvmlite and the processor are added to it. A pointer is given as an address. The functions raise ZeroDivisionError,
-    and TypeError for what is no number. Two processes may do this at once.
+    `make` returns numba functions, each compiled for one signature of int64, float64 and pointers, or LLVM's text of some.
+    It is called where the cache folder has nothing that was made of the same: `made_of` is all of the source. The versions of
+    Python, numba and llvmlite and the processor are added to it. A pointer is given as an address. The functions raise
+    ZeroDivisionError, and TypeError for what is no number. Two processes may do this at once.
 
     Where nothing can be kept, every start compiles and says so, or, if not `unkept`, OSError is raised.
     """
@@ -39,7 +40,7 @@ def load(
     if code is None:
         kept = _room(path.parent, unkept)
         say_compiling()
-        from bubbleskin.native.build import native_code  # with numba
+        from bubbleskin.native.build import native_code
 
         code = native_code(make())
         if kept:
@@ -78,7 +79,7 @@ def _room(folder: Path, unkept: bool) -> bool:
 def _key(made_of: bytes) -> str:
     machine = (llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
     here = Path(__file__).parent
-    ours = b"".join((here / name).read_bytes() for name in ("build.py", "entry.py"))
+    ours = b"".join((here / name).read_bytes() for name in ("build.py", "entry.py", "optimized.py"))
     versions = (sys.version, version("numba"), version("llvmlite"))
     return hashlib.sha256(repr((made_of, ours, versions, machine)).encode()).hexdigest()[:24]
 

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -52,6 +53,7 @@ _NEAR_MM = 0.3
 """A way is gone where all heights alone rest so near its end."""
 _AHEAD = 64
 """Of a sequence so many steps are looked at for the one that is played."""
+_AT_REST = ("resting", "settled", "unsure", "missed")
 _POLL = 0.02
 """Seconds between two looks at whether a shape has settled."""
 _QUIET = 1.0
@@ -89,6 +91,7 @@ class Shows:
         self._leg: _Leg | None = None  # of the last show, and whether its end has been seen
         self._seen = False
         self._looked: Array | None = None  # heights alone that were told on its way
+        self._taken_at = -np.inf  # device's time at which it took the heights of the last show, s
         self._said = -np.inf  # when a stream was last said to be short
 
     def opened(self, info: Info) -> None:
@@ -178,11 +181,12 @@ class Shows:
 
     async def _send(self, alone: Array, over: float) -> None:
         micrometres = np.rint(alone * 1000).astype(int).tolist()
-        await self._link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
+        reply = await self._link.call("SHOW", (round(over * 1000),), [(height,) for height in micrometres])
+        self._taken_at = reply["ticks"] * self._info.tick
 
     def _note(self, steps: list[Array], asked: Array | None) -> None:
         self._steps, self._asked, self._leg, self._seen = list(steps), asked, None, False
-        self._looked = None
+        self._looked, self._taken_at = None, -np.inf
         self._pressed.reach(np.max(steps, axis=0), self._link.transport.now())
 
     def _catch_up(self) -> None:
@@ -240,6 +244,8 @@ class Shows:
 
     def tell(self, state: State) -> State:
         """The state of tops, of what a device believes of each bubble by itself."""
+        if state.time == self._taken_at:  # no tick has seen what was asked: the rest is that of before
+            state = replace(state, status=tuple("moving" if status in _AT_REST else status for status in state.status))
         if not self._limits.gaps or np.isnan(state.alone_mm).any():
             return state
         now = self._link.transport.now()

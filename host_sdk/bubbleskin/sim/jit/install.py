@@ -9,7 +9,7 @@ import ctypes
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
@@ -17,7 +17,7 @@ from typing import Any
 from bubble_protocol import mpy_compat
 from bubbleskin import native
 from bubbleskin.errors import InvalidInput
-from bubbleskin.sim.jit import translate
+from bubbleskin.sim.jit import assemble, translate
 
 SWITCH = "BUBBLESKIN_JIT"
 MODES = ("1", "0", "check")
@@ -26,7 +26,7 @@ _lock = threading.RLock()
 functions_of: dict[str, dict[str, FunctionType]] = {}  # as they are written, by module and name
 _held: dict[str, dict[str, FunctionType]] = {}  # what callers hold
 _plain: dict[tuple[str, str], tuple[CodeType, dict[str, Any] | None]] = {}
-_TRANSLATION = ("translate.py", "memory.py")
+_TRANSLATION = ("translate.py", "assemble.py")
 
 
 def enable() -> None:
@@ -101,7 +101,7 @@ def _made(module: str, functions: dict[str, FunctionType]) -> dict[str, Callable
         return native.load(
             module.rpartition(".")[2],
             _made_of(module, names),
-            lambda: _compiled(functions, translate.compiled_source(functions, names)),
+            lambda: assemble.assembly(functions, names),
             unkept=False,
         )
     except (translate.NotViperError, OSError, ImportError, RuntimeError) as problem:
@@ -117,13 +117,6 @@ def _made_of(module: str, names: Mapping[str, Any]) -> bytes:
     files = [Path(sys.modules[module].__file__ or ""), *(Path(__file__).with_name(f) for f in _TRANSLATION)]
     constants = sorted((name, value) for name, value in names.items() if type(value) is int)
     return b"".join(file.read_bytes() for file in files) + repr(constants).encode()
-
-
-def _compiled(functions: Iterable[str], source: str) -> dict[str, Any]:
-    """numba's functions, of their translated source."""
-    space: dict[str, Any] = {}
-    exec(source, space)
-    return {name: space[f"compiled_{name}"] for name in functions}
 
 
 def _fill(held: FunctionType, function: FunctionType, compiled: Callable[..., Any]) -> None:
