@@ -34,8 +34,8 @@ def failing(skin):
     mend = []
 
     def fail(failure, bubble, value):
-        mend.append((failure, bubble))
         skin.simulated.inject(failure, bubble, value)
+        mend.append((failure, bubble))
 
     yield fail
     for failure, bubble in mend:
@@ -190,3 +190,41 @@ def test_a_supply_that_is_gone_vents_and_is_named(skin, failing):
     assert np.abs(skin.state().pressure_kpa).max() < 1.0
     with pytest.raises(bs.BubbleskinError):
         skin.show(np.full(n, 6.0))
+
+
+def press(skin, failing):
+    """Press the emergency stop."""
+    try:
+        failing("estop", 0, 1)
+    except bs.InvalidInput as problem:
+        pytest.skip(str(problem))
+
+
+def test_the_emergency_stop_vents_whatever_is_asked(skin, failing):
+    n = skin.info.bubbles
+    skin.show(np.full(n, 8.0))
+    press(skin, failing)
+    skin.sleep(0.1)
+    assert skin.state().mode == "stopped"
+    assert skin.health().board_faults == ("emergency_stop",)
+    skin.sleep(1.0)
+    assert np.abs(skin.state().pressure_kpa).max() < 1.0
+    with pytest.raises(bs.BubbleskinError):
+        skin.show(np.full(n, 6.0))
+    assert skin.state().mode == "stopped"
+
+
+@pytest.mark.long
+def test_the_emergency_stop_cannot_be_cleared_while_it_is_pressed(skin, failing):
+    n = skin.info.bubbles
+    press(skin, failing)
+    skin.sleep(1.5)
+    skin.clear_faults()
+    assert skin.state().mode == "stopped"
+    assert skin.health().board_faults == ("emergency_stop",)
+    skin.simulated.inject("estop", 0, 0)
+    skin.sleep(1.5)
+    assert skin.state().mode == "stopped", "releasing it starts nothing, nor does what was cleared before"
+    skin.clear_faults()
+    assert skin.state().mode in ("venting", "idle")
+    skin.show(np.full(n, 6.0))
