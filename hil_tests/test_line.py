@@ -142,6 +142,22 @@ def test_the_wristband_refuses_heights_for_another_number_of_bubbles(skin, by):
 
 
 @pytest.mark.long
+def test_the_wristband_refuses_a_ramp_that_is_too_long(skin):
+    with pytest.raises(bs.DeviceRefused):
+        raw_show(skin, [6000] * skin.info.bubbles, over_ms=60001)
+    assert skin.state().mode in ("venting", "idle")
+
+
+@pytest.mark.long
+def test_a_new_session_has_not_subscribed_to_what_another_has(skin):
+    at_once(skin.link.call("SUBSCRIBE", (10,)))
+    at_once(skin.link.hello())
+    skin.link.telemetry.clear()
+    skin.sleep(0.5)
+    assert not skin.link.telemetry
+
+
+@pytest.mark.long
 def test_a_show_at_its_limits_is_taken(skin):
     raw_show(skin, [round(skin.info.height_max_mm * 1000)] * skin.info.bubbles, over_ms=60000)
     assert skin.state().mode == "active"

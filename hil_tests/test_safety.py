@@ -94,6 +94,9 @@ def test_pressure_and_time_have_a_budget(skin):
         assert skin.faults() == {1: ("budget",)}, "those at low pressure have their budget left"
         skin.sleep(0.5)
         assert skin.state().pressure_kpa[1] < 5
+        skin.sleep(1.0)
+        skin.clear_faults()
+        assert skin.faults() == {}, "without pressure it recovers"
     finally:
         skin.configure(budget_kpa_s=before)
         skin.vent()
@@ -133,6 +136,34 @@ def test_the_ill_bubble_is_isolated_and_only_that(skin, failing, what):
     others = np.arange(n) != ill
     if skin.state().mode == "active":
         assert skin.simulated.alone_mm[others] == pytest.approx(9.0, abs=0.3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("failure", "first", "then", "name"), [("fill_stuck", 5.0, 9.0, "no_air"), ("vent_stuck", 9.0, 5.0, "valve_stuck")]
+)
+def test_a_valve_that_does_not_open_is_found_when_it_is_asked_to(skin, failing, failure, first, then, name):
+    n, ill = skin.info.bubbles, 0
+    skin.show(np.full(n, first))
+    failing(failure, ill, -1)
+    skin.sleep(0.5)
+    assert skin.faults() == {}, "it is not asked for anything"
+    skin.show(np.full(n, then), wait=False)
+    skin.sleep(0.3)
+    assert list(skin.faults()) == [ill]
+    assert name in skin.faults()[ill]
+
+
+@pytest.mark.long
+def test_a_leak_that_control_makes_up_for_is_found_by_the_air_that_it_takes(skin, failing):
+    ill = 2
+    skin.show(np.full(skin.info.bubbles, 10.5))
+    failing("leak", ill, 9e-6)  # 200 µJ/ms at this height
+    for _ in range(15):
+        skin.sleep(0.1)
+        if skin.faults():
+            break
+    assert skin.faults() == {ill: ("leak",)}
 
 
 @pytest.mark.long
@@ -219,7 +250,9 @@ def test_the_emergency_stop_cannot_be_cleared_while_it_is_pressed(skin, failing)
     n = skin.info.bubbles
     press(skin, failing)
     skin.sleep(1.5)
+    pressed = skin.fault_log()[-1]
     skin.clear_faults()
+    assert skin.fault_log()[-1] == pressed, "neither acknowledged nor, a tick later, there again"
     assert skin.state().mode == "stopped"
     assert skin.health().board_faults == ("emergency_stop",)
     skin.simulated.inject("estop", 0, 0)

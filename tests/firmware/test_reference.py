@@ -74,6 +74,36 @@ def test_a_correction_moves_no_bubble_further_than_its_slope_can_tell(
     assert moved <= (APART_MM + 0.05) * per_mm or resting["AIR"][0] == 0
 
 
+@pytest.mark.parametrize(("before", "pressure"), [(26_000, 12_000), (-26_000, 4_000)])
+def test_the_curves_error_is_never_taken_for_more_than_rubber_can_differ(resting, before, pressure):
+    """The pressure says that the curve is further off than before, and nothing else is in doubt."""
+    for name, value in {
+        "AIR": 90_000,
+        "AIR_SD": 100,
+        "AIR_SLOPE": 800,
+        "CURVE_ERROR": before,
+        "CURVE_ERROR_SD": 20_000,
+        "CORRELATION": 0,
+        "DWELL_SLOPE": 1,
+        "CURVE_BEND": 0,
+        "CURVE_PRESSURE": 8_000,
+        "QUIET_PRESSURE": pressure,
+    }.items():
+        resting[name][0] = value
+    reference.correct(resting.bubbles.rows, resting.bubbles.state, 1)
+    assert abs(int(resting["CURVE_ERROR"][0])) == 26_214  # 0.4, * 65536
+
+
+@pytest.mark.parametrize("air", [-1, 400_001, 500_000])
+def test_no_bubble_has_more_air_than_any_can_hold_nor_less_than_none(resting, air):
+    resting.run(0.1)
+    for name, value in {"AIR": air, "EMPTY_TICKS": 0, "QUIESCENT": 0}.items():
+        resting[name][0] = value
+    counts = np.full(resting.bubbles.count + 1, boards.load("wristband7").SENSOR_ZERO + 400, np.uint16)
+    resting.bubbles.step(counts, 60_000, 0)
+    assert 0 <= resting["AIR"][0] <= 400_000
+
+
 @pytest.mark.parametrize(("off", "kept"), [(0, True), (3000, True), (-60_000, False), (80_000, False)])
 def test_what_was_learned_at_an_air_that_was_not_there_is_forgotten(off, kept):
     resting = Resting()

@@ -19,7 +19,6 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("protocol", "firmware", "host_sdk")
 HIL = ("hil_tests", "--target", "sim://wristband7?contact=0")
 EVERYDAY = "not slow and not chip"
-SLOW = "slow and not chip"
 LONGEST_S = 400
 # A loop without end in compiled code hears no signal: faulthandler's own thread, in C, ends the process.
 QUICK = (
@@ -28,10 +27,16 @@ QUICK = (
 )  # fmt: skip
 
 _FIRMWARE = ("tests/firmware", "tests/protocol", "tests/store", "tests/promises")
-_CONTROL = ("tests/firmware/test_golden_traces.py", "tests/firmware/test_identity.py", "tests/firmware/test_reference.py")
+_CONTROL = (
+    "tests/firmware/test_golden_traces.py",
+    "tests/firmware/test_identity.py",
+    "tests/firmware/test_reference.py",
+)
 _SAFETY = tuple(f"tests/firmware/test_{name}.py" for name in ("golden_traces", "guards", "safety", "states", "supply"))
 _LINK = tuple(f"tests/firmware/test_{name}.py" for name in ("delivery", "requests", "states"))
-_WIRE = tuple(f"tests/sdk/test_{name}.py" for name in ("wire", "link", "exactly_once", "overtaking", "keepalive", "clock"))
+_WIRE = tuple(
+    f"tests/sdk/test_{name}.py" for name in ("wire", "link", "exactly_once", "overtaking", "keepalive", "clock")
+)
 # The tests that look at a file, by the beginning of its path: the nearest, then all that can be meant.
 NEAREST: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
     ("firmware/bubble_firmware/control", (_CONTROL, _FIRMWARE)),
@@ -41,7 +46,7 @@ NEAREST: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
     ("firmware", (_SAFETY, _FIRMWARE)),
     ("protocol", (("tests/protocol",), _LINK, _FIRMWARE, ("tests/sdk",))),
     ("host_sdk/bubbleskin/calibrate", (("tests/calibrate",),)),
-    ("host_sdk", (_WIRE, ("tests/sdk",), ("tests/cli",))),
+    ("host_sdk", (_WIRE, ("tests/sdk",))),
 )
 
 
@@ -84,13 +89,16 @@ class Workshop:
         self._planted += 1
         os.utime(path, (self._planted, self._planted))
 
-    def found_by(self, file: str, others: Iterable[tuple[str, ...]] = (), marks: str = EVERYDAY) -> str:
-        """The first test that fails of those of this file's part, then of `others`; empty where none does."""
+    def check(self, files: Iterable[str], *others: tuple[str, ...]) -> None:
+        """Without a mistake nothing may fail of the tests of these files and of `others`, or all that is planted is found."""
+        for suite in {*others, *(suite for file in files for suite in suites(file))}:
+            if failed := self.run(suite):
+                sys.exit(f"{failed} fails without any mistake; it has to pass before any is planted.")
+
+    def found_by(self, file: str) -> str:
+        """The first test that fails of those of this file's part; empty where none does."""
         for suite in suites(file):
-            if found := self.run(suite, marks):
-                return found
-        for suite in others:
-            if found := self.run(suite, ""):
+            if found := self.run(suite):
                 return found
         return ""
 
@@ -114,8 +122,10 @@ class Workshop:
             return f"{tests[0]}: hangs"
         if process.returncode in (0, 5):  # 5: none of these has this mark
             return ""
-        failed = [line for line in said.splitlines() if line.startswith(("FAILED", "ERROR"))]
-        return failed[0].split(" - ")[0].split(" ", 1)[1].replace(HIL[-1], "sim") if failed else f"{tests[0]}: ends with {process.returncode}"
+        for line in said.splitlines():
+            if line.startswith(("FAILED", "ERROR")):
+                return line.split(" - ")[0].split(" ", 1)[1].replace(HIL[-1], "sim")
+        return f"{tests[0]}: ends with {process.returncode}"
 
 
 def _borrowed_cache(cache: Path) -> Path:
