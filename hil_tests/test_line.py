@@ -95,6 +95,40 @@ def test_what_is_no_frame_is_left_out(skin, line):
 
 
 @pytest.mark.long
+def test_an_answer_that_is_garbled_is_not_believed(skin, monkeypatch):
+    transport = skin.link.transport
+    read, spoiled = transport.read, []
+
+    def garbled(timeout):
+        data = read(timeout)
+        if len(data) > 40 and not spoiled:  # the state's answer, not a PING's
+            spoiled.append(data)
+            return flipped(0.5)(data)
+        return data
+
+    before = skin.state()
+    monkeypatch.setattr(transport, "read", garbled)
+    state = skin.state()
+    assert spoiled
+    assert state.height_mm == pytest.approx(before.height_mm, abs=0.1)
+    assert state.pressure_kpa == pytest.approx(before.pressure_kpa, abs=0.5)
+    assert state.target_mm == pytest.approx(before.target_mm)
+
+
+@pytest.mark.long
+def test_a_restart_that_nobody_asked_for_is_told(skin):
+    if not skin.simulated:
+        pytest.skip("a real wristband's power is not cut; `bubbleskin hil --device sim://…` tries this on its firmware")
+    skin.show(np.full(skin.info.bubbles, 6.0))
+    boot = skin.info.boot_id
+    skin.simulated.reset()
+    with pytest.raises(bs.DeviceRestarted):
+        skin.show(np.full(skin.info.bubbles, 7.0))
+    assert skin.info.boot_id != boot
+    assert skin.state().mode in ("idle", "boot")
+
+
+@pytest.mark.long
 def test_requests_of_another_session_are_not_heard(target, skin, line):
     """A frame kept from before a new greeting belongs to nobody."""
     n = skin.info.bubbles

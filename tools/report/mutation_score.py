@@ -44,15 +44,26 @@ _Z = 1.96  # of an interval that has the true score in 95 of 100 cases
 
 
 class Change(NamedTuple):
-    """One change: `name` is part, file, line and which of that line's changes; `text` is the whole file with it."""
+    """One change: `name` is file, line and which of that line's changes; `was` and `now` are what stands there."""
 
     name: str
     part: str
     file: str
-    line: int
     was: str
     now: str
-    text: str
+    module: cst.Module
+    node: cst.CSTNode
+    other: cst.CSTNode
+
+    @property
+    def text(self) -> str:
+        """The whole file with it."""
+        return str(self.module.deep_replace(self.node, self.other).code)  # type: ignore[union-attr, arg-type]
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """By what the reasons of survivors are found: a line's number does not stay."""
+        return self.file, self.was, self.now
 
 
 class _Visitor(MutationVisitor):
@@ -78,8 +89,8 @@ def changes(part: str, file: str) -> Iterator[Change]:
         line = positions[mutation.original_node].start.line
         numbers[line] = numbers.get(line, 0) + 1
         was, now = (module.code_for_node(node).strip() for node in (mutation.original_node, mutation.mutated_node))
-        text = module.deep_replace(mutation.original_node, mutation.mutated_node).code  # type: ignore[arg-type]
-        yield Change(f"{file}:{line}#{numbers[line]}", part, file, line, was, now, text)
+        name = f"{file}:{line}#{numbers[line]}"
+        yield Change(name, part, file, was, now, module, mutation.original_node, mutation.mutated_node)
 
 
 def drawn(only: str = "") -> list[Change]:
@@ -135,7 +146,7 @@ def verdict(
     console = Console(width=200)
     table = Table("part", "changes there are", "planted", "found", "the same as before", "survive")
     survivors = [change for change, test in found.items() if not test]
-    same = {change for change in survivors if reasons.get(change[2:3] + change[4:6], {}).get("same")}
+    same = {change for change in survivors if reasons.get(change.key, {}).get("same")}
     for part in PARTS:
         ours = [change for change in found if change.part == part]
         left = sum(change in survivors and change not in same for change in ours)
@@ -145,7 +156,7 @@ def verdict(
     console.print(table)
     for change in survivors:
         console.print(
-            f"{change.name}: {change.was} -> {change.now}: {reasons.get(change[2:3] + change[4:6], {}).get('why', 'NO REASON')}",
+            f"{change.name}: {change.was} -> {change.now}: {reasons.get(change.key, {}).get('why', 'NO REASON')}",
             markup=False,
         )
     of, hits = len(found) - len(same), len(found) - len(survivors)
@@ -154,7 +165,7 @@ def verdict(
         f"{hits} of {of} changes are found, {hits / of:.1%} (95 % of such samples have the true score between {low:.1%} and "
         f"{high:.1%}); with the {len(same)} that change nothing {hits / len(found):.1%}."
     )
-    unexplained = [change for change in survivors if change[2:3] + change[4:6] not in reasons]
+    unexplained = [change for change in survivors if change.key not in reasons]
     return 0 if hits >= LEAST * of and not unexplained else 1
 
 

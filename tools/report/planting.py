@@ -23,7 +23,7 @@ LONGEST_S = 400
 # A loop without end in compiled code hears no signal: faulthandler's own thread, in C, ends the process.
 QUICK = (
     "-x", "-q", "-p", "no:cacheprovider", "--timeout", "100",
-    "-o", "faulthandler_timeout=60", "-o", "faulthandler_exit_on_timeout=true",
+    "-o", "faulthandler_timeout=90", "-o", "faulthandler_exit_on_timeout=true",
 )  # fmt: skip
 
 _FIRMWARE = ("tests/firmware", "tests/protocol", "tests/store", "tests/promises")
