@@ -95,24 +95,27 @@ def test_what_is_no_frame_is_left_out(skin, line):
 
 
 @pytest.mark.long
-def test_an_answer_that_is_garbled_is_not_believed(skin, monkeypatch):
+@pytest.mark.parametrize("place", np.linspace(0.2, 0.8, 7).tolist())
+def test_an_answer_that_is_garbled_is_not_believed(skin, monkeypatch, place):
     transport = skin.link.transport
     read, spoiled = transport.read, []
 
     def garbled(timeout):
         data = read(timeout)
         if len(data) > 40 and not spoiled:  # the state's answer, not a PING's
+            at = round(place * (len(data) - 2))
             spoiled.append(data)
-            return flipped(0.5)(data)
+            return data[:at] + bytes([data[at] ^ 64 or 1]) + data[at + 1 :]
         return data
 
     before = skin.state()
     monkeypatch.setattr(transport, "read", garbled)
     state = skin.state()
     assert spoiled
-    assert state.height_mm == pytest.approx(before.height_mm, abs=0.1)
-    assert state.pressure_kpa == pytest.approx(before.pressure_kpa, abs=0.5)
-    assert state.target_mm == pytest.approx(before.target_mm)
+    assert state.height_mm == pytest.approx(before.height_mm, abs=0.02)
+    assert state.pressure_kpa == pytest.approx(before.pressure_kpa, abs=0.3)
+    assert state.target_mm == pytest.approx(before.target_mm, abs=1e-6)
+    assert (state.status, state.faults) == (before.status, before.faults)
 
 
 @pytest.mark.long

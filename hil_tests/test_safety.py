@@ -240,8 +240,8 @@ def test_the_emergency_stop_vents_whatever_is_asked(skin, failing):
     assert skin.health().board_faults == ("emergency_stop",)
     skin.sleep(1.0)
     assert np.abs(skin.state().pressure_kpa).max() < 1.0
-    with pytest.raises(bs.BubbleskinError):
-        skin.show(np.full(n, 6.0))
+    with pytest.raises(bs.DeviceRefused):
+        skin.show(np.full(n, 6.0), wait=False)
     assert skin.state().mode == "stopped"
 
 
