@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import bubble_firmware.control.state_layout as layout
 from bubble_firmware.control import reference
+from bubble_protocol.schema.statuses import MOVING
 from bubbleskin import boards
 from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
@@ -97,7 +98,7 @@ def test_the_curves_error_is_never_taken_for_more_than_rubber_can_differ(resting
 @pytest.mark.parametrize("air", [-1, 400_001, 500_000])
 def test_no_bubble_has_more_air_than_any_can_hold_nor_less_than_none(resting, air):
     resting.run(0.1)
-    for name, value in {"AIR": air, "EMPTY_TICKS": 0, "QUIESCENT": 0}.items():
+    for name, value in {"AIR": air, "STATUS": MOVING, "FAR_TICKS": 0, "EMPTY_TICKS": 0, "QUIESCENT": 0}.items():
         resting[name][0] = value
     counts = np.full(resting.bubbles.count + 1, boards.load("wristband7").SENSOR_ZERO + 400, np.uint16)
     resting.bubbles.step(counts, 60_000, 0)
