@@ -20,6 +20,7 @@ SOURCES = ("protocol", "firmware", "host_sdk")
 HIL = ("hil_tests", "--target", "sim://wristband7?contact=0")
 EVERYDAY = "not slow and not chip"
 LONGEST_S = 600
+_KEPT = platformdirs.user_cache_path("bubbleskin")
 # A loop without end in compiled code hears no signal: faulthandler's own thread, in C, ends the process.
 QUICK = (
     "-x", "-q", "-p", "no:cacheprovider", "--timeout", "100",
@@ -76,6 +77,7 @@ class Workshop:
             "PYTHONPATH": os.pathsep.join(str(folder / source) for source in SOURCES),
             "PYTHONPYCACHEPREFIX": str(folder / "pyc"),
             "XDG_CACHE_HOME": str(_borrowed_cache(folder / "cache")),
+            "BUBBLESKIN_CACHE": os.environ.get("BUBBLESKIN_CACHE") or str(_KEPT),  # what is built may be shared
         }
         self._environment.pop("PYTHONDONTWRITEBYTECODE", None)
 
@@ -136,10 +138,11 @@ class Workshop:
 
 
 def _borrowed_cache(cache: Path) -> Path:
-    """Links to what has been compiled before: what is compiled of a mistake stays here, and goes with it."""
-    known = platformdirs.user_cache_path("bubbleskin")
-    if known.is_dir():
-        shutil.copytree(known, cache / "bubbleskin", copy_function=os.symlink)
+    """Links to the native code that is kept: what is compiled of a mistake stays here, and goes with it."""
+    native = cache / "bubbleskin" / "native"
+    native.mkdir(parents=True)
+    for kept in (_KEPT / "native").glob("*.o"):
+        (native / kept.name).symlink_to(kept)
     return cache
 
 
