@@ -38,7 +38,7 @@ _LINK = tuple(f"tests/firmware/test_{name}.py" for name in ("delivery", "request
 _WIRE = tuple(
     f"tests/sdk/test_{name}.py" for name in ("wire", "link", "exactly_once", "overtaking", "keepalive", "clock")
 )
-_OVER_IT = tuple(
+_OVER_IT = ("tests/sim/test_serve.py",) + tuple(
     f"tests/sdk/test_{name}.py"
     for name in (
         *("asyncio", "connect", "host_frames", "host_killed", "logging", "play", "processes", "reconnect", "refusals"),
