@@ -38,12 +38,15 @@ _LINK = tuple(f"tests/firmware/test_{name}.py" for name in ("delivery", "request
 _WIRE = tuple(
     f"tests/sdk/test_{name}.py" for name in ("wire", "link", "exactly_once", "overtaking", "keepalive", "clock")
 )
-_OVER_IT = ("tests/sim/test_serve.py",) + tuple(
-    f"tests/sdk/test_{name}.py"
-    for name in (
-        *("asyncio", "connect", "host_frames", "host_killed", "logging", "play", "processes", "reconnect", "refusals"),
-        *("show", "telemetry", "threads", "uploads", "wristband19"),
-    )
+_OVER_IT = (
+    "tests/sim/test_serve.py",
+    *(
+        f"tests/sdk/test_{name}.py"
+        for name in (
+            *("asyncio", "connect", "host_frames", "host_killed", "logging", "play", "processes", "reconnect"),
+            *("refusals", "show", "telemetry", "threads", "uploads", "wristband19"),
+        )
+    ),
 )
 # The tests that look at a file, by the beginning of its path: the nearest, then all that can be meant.
 NEAREST: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...] = (
