@@ -1,5 +1,7 @@
 """What the membrane may correct: never by more than its slope here can tell, and nothing that was learned at an air not there."""
 
+from array import array
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 import bubble_firmware.control.state_layout as layout
 from bubble_firmware.control import reference
-from bubble_protocol.schema.statuses import MOVING
+from bubble_protocol.schema.statuses import FAULT, MOVING
 from bubbleskin import boards
 from bubbleskin.sim.board import SimulatedBoard
 from bubbleskin.sim.firmware import InProcessFirmware
@@ -121,3 +123,24 @@ def test_what_was_learned_at_an_air_that_was_not_there_is_forgotten(off, kept):
     else:
         assert (resting["CURVE_ERROR"] == 0).all()
         assert (resting["CURVE_ERROR_SD"] == board_sd).all()
+
+
+@pytest.mark.parametrize(
+    ("changed", "ticks", "emptied"),
+    [
+        ({}, 1, True),
+        ({}, 2, False),
+        ({"AIR_SD": 100}, 1, False),
+        ({"FLOW_SD": 1311}, 1, False),
+        ({"STATUS": FAULT}, 1, False),
+        ({"HEIGHT": 11_500 << 4}, 1, False),
+    ],
+    ids=["asked at once", "by a ramp", "known well", "metered badly", "vented", "near its target"],
+)
+def test_a_bubble_whose_height_is_known_badly_is_emptied_first(resting, changed, ticks, emptied):
+    resting.bubbles.set_atmosphere(101_325, 200)
+    usual = {"AIR_SD": 30_000, "FLOW_SD": 600, "STATUS": MOVING, "HEIGHT": 9000 << 4}
+    for name, value in {**usual, **changed}.items():
+        resting[name][:] = value
+    resting.bubbles.set_targets(array("i", [12_000] * resting.bubbles.count), 0, ticks)
+    assert resting["REZERO"].astype(bool).tolist() == [emptied] * resting.bubbles.count

@@ -44,11 +44,12 @@ _Z = 1.96  # of an interval that has the true score in 95 of 100 cases
 
 
 class Change(NamedTuple):
-    """One change: `name` is file, line and which of that line's changes; `was` and `now` are what stands there."""
+    """One change: `name` is file, line and which of that line's changes; `was` and `now` are what stands in `line`."""
 
     name: str
     part: str
     file: str
+    line: str
     was: str
     now: str
     module: cst.Module
@@ -61,9 +62,9 @@ class Change(NamedTuple):
         return str(self.module.deep_replace(self.node, self.other).code)  # type: ignore[union-attr, arg-type]
 
     @property
-    def key(self) -> tuple[str, str, str]:
+    def key(self) -> tuple[str, ...]:
         """By what the reasons of survivors are found: a line's number does not stay."""
-        return self.file, self.was, self.now
+        return self.file, self.line, self.was, self.now
 
 
 class _Visitor(MutationVisitor):
@@ -78,6 +79,7 @@ class _Visitor(MutationVisitor):
 def changes(part: str, file: str) -> Iterator[Change]:
     """All changes of one file, in functions and methods: what stands outside is run when it is imported, or is generated."""
     source = (ROOT / file).read_text(encoding="utf-8")
+    lines = source.splitlines()
     wrapper = cst.MetadataWrapper(cst.parse_module(source))
     visitor = _Visitor(mutation_operators, IgnoredCode(set(), set(), set()))
     module = wrapper.visit(visitor)
@@ -90,7 +92,9 @@ def changes(part: str, file: str) -> Iterator[Change]:
         numbers[line] = numbers.get(line, 0) + 1
         was, now = (module.code_for_node(node).strip() for node in (mutation.original_node, mutation.mutated_node))
         name = f"{file}:{line}#{numbers[line]}"
-        yield Change(name, part, file, was, now, module, mutation.original_node, mutation.mutated_node)
+        yield Change(
+            name, part, file, lines[line - 1].strip(), was, now, module, mutation.original_node, mutation.mutated_node
+        )
 
 
 def drawn(only: str = "") -> list[Change]:
@@ -124,7 +128,9 @@ def main() -> int:
     if not sample:
         sys.exit("There is nothing to plant: no file has this word, or all is skipped.")
     known = tomllib.loads(SURVIVORS.read_text(encoding="utf-8")) if SURVIVORS.exists() else {}
-    reasons = {(entry["file"], entry["was"], entry["now"]): entry for entry in known.get("survivor", [])}
+    reasons = {
+        tuple(entry[name] for name in ("file", "line", "was", "now")): entry for entry in known.get("survivor", [])
+    }
     found: dict[Change, str] = {}
     with workshop() as shop:
         print("the tests without any change", flush=True)
@@ -139,9 +145,7 @@ def main() -> int:
     return verdict(everything, found, reasons)
 
 
-def verdict(
-    everything: list[Change], found: dict[Change, str], reasons: dict[tuple[str, str, str], dict[str, str]]
-) -> int:
+def verdict(everything: list[Change], found: dict[Change, str], reasons: dict[tuple[str, ...], dict[str, str]]) -> int:
     """The table, the score, and the survivors; 1 where the score is too low or a survivor has no reason."""
     console = Console(width=200)
     table = Table("part", "changes there are", "planted", "found", "the same as before", "survive")

@@ -137,7 +137,7 @@ class Workshop:
         for line in said.splitlines():
             if line.startswith(("FAILED", "ERROR")):
                 return line.split(" - ")[0].split(" ", 1)[1].replace(HIL[-1], "sim")
-        return f"{tests[0]}: ends with {process.returncode}"
+        return f"{tests[0]}: hangs or breaks off, status {process.returncode}"
 
 
 def _borrowed_cache(cache: Path) -> Path:
