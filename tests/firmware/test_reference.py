@@ -133,9 +133,11 @@ def test_what_was_learned_at_an_air_that_was_not_there_is_forgotten(off, kept):
         ({"AIR_SD": 100}, 1, False),
         ({"FLOW_SD": 1311}, 1, False),
         ({"STATUS": FAULT}, 1, False),
-        ({"HEIGHT": 11_500 << 4}, 1, False),
+        ({"HEIGHT": 11_000 << 4}, 1, False),
+        ({"HEIGHT": 13_000 << 4}, 1, False),
+        ({"HEIGHT": 13_001 << 4}, 1, True),
     ],
-    ids=["asked at once", "by a ramp", "known well", "metered badly", "vented", "near its target"],
+    ids=["asked at once", "by a ramp", "known well", "metered badly", "vented", "a mm below", "a mm above", "and more"],
 )
 def test_a_bubble_whose_height_is_known_badly_is_emptied_first(resting, changed, ticks, emptied):
     resting.bubbles.set_atmosphere(101_325, 200)

@@ -160,6 +160,7 @@ def test_the_first_value_beyond_its_limit_is_named_and_none_at_it(message):
     fixed, stride = message.fixed_values, message.stride_values
     total = fixed + count * stride
     none = [None] * (fixed + stride)
+    assert message.limits is None or len(message.limits) == 2
     lows, highs = message.limits or (none, none)
     for ends, others, beyond in ((lows, highs, -1), (highs, lows, 1)):
         at = [place if place < fixed else fixed + (place - fixed) % stride for place in range(total)]

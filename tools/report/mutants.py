@@ -39,7 +39,8 @@ class Mutant(NamedTuple):
 
 def mutants() -> list[Mutant]:
     """The list, each checked to be one place in its file."""
-    found = [Mutant(**entry) for entry in tomllib.loads(LIST.read_text(encoding="utf-8"))["mutant"]]
+    entries = tomllib.loads(LIST.read_text(encoding="utf-8"))["mutant"]
+    found = [Mutant(**{**entry, "tests": tuple(entry.get("tests", ()))}) for entry in entries]
     for mutant in found:
         places = (ROOT / mutant.file).read_text(encoding="utf-8").count(mutant.old)
         if places != 1:
@@ -55,7 +56,7 @@ def found_by(mutant: Mutant, shop: Workshop, *, parts: bool) -> str:
     with shop.planted(mutant.file, text):
         if not parts and (found := shop.run(HIL)):
             return found
-        return shop.found_by(mutant.file) or (shop.run(tuple(mutant.tests), "") if mutant.tests else "")
+        return shop.found_by(mutant.file) or (shop.run(mutant.tests, "") if mutant.tests else "")
 
 
 def main() -> int:
