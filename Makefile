@@ -12,7 +12,7 @@ UNCOVERED := tests/sdk/test_leaks.py
 EMULATED := --target rp2040://wristband7?contact=0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test chip chip-long check lint generated micropython docs release release-trial bench day soak fuzz hostile leaks readers generate lock clean
+.PHONY: help setup demo test chip chip-long check lint generated micropython docs release release-trial bench day soak fuzz hostile leaks readers mutants generate lock clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -101,6 +101,9 @@ leaks: setup micropython ## 500 connections to each target but the chip, and 100
 
 readers: setup ## 100,000 files that are none, for every reader; six minutes
 	$(BIN)/python tools/stress/readers.py
+
+mutants: setup micropython ## plant mistakes, one at a time, and look what finds them: a list, then a sample of mutmut's; an hour
+	$(BIN)/python tools/report/mutants.py; listed=$$?; $(BIN)/python tools/report/mutation_score.py && exit $$listed
 
 bench: setup ## measure speeds
 	$(BIN)/bubbleskin bench

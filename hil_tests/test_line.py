@@ -101,6 +101,44 @@ def test_what_is_no_frame_is_left_out(skin, line):
     assert skin.state().mode == "active"
 
 
+@pytest.mark.promise("no-frame")
+@pytest.mark.long
+@pytest.mark.parametrize("place", np.linspace(0.2, 0.8, 7).tolist())
+def test_an_answer_that_is_garbled_is_not_believed(skin, monkeypatch, place):
+    transport = skin.link.transport
+    read, spoiled = transport.read, []
+
+    def garbled(timeout):
+        data = read(timeout)
+        if len(data) > 40 and not spoiled:  # the state's answer, not a PING's
+            at = round(place * (len(data) - 2))
+            spoiled.append(data)
+            return data[:at] + bytes([data[at] ^ 64 or 1]) + data[at + 1 :]
+        return data
+
+    before = skin.state()
+    monkeypatch.setattr(transport, "read", garbled)
+    state = skin.state()
+    assert spoiled
+    assert state.height_mm == pytest.approx(before.height_mm, abs=0.02)
+    assert state.pressure_kpa == pytest.approx(before.pressure_kpa, abs=0.3)
+    assert state.target_mm == pytest.approx(before.target_mm, abs=1e-6)
+    assert (state.status, state.faults) == (before.status, before.faults)
+
+
+@pytest.mark.promise("restart-told")
+@pytest.mark.not_on("board", "a real wristband's power is not cut")
+@pytest.mark.long
+def test_a_restart_that_nobody_asked_for_is_told(skin):
+    skin.show(np.full(skin.info.bubbles, 6.0))
+    boot = skin.info.boot_id
+    skin.simulated.reset()
+    with pytest.raises(bs.DeviceRestarted):
+        skin.show(np.full(skin.info.bubbles, 7.0))
+    assert skin.info.boot_id != boot
+    assert skin.state().mode in ("idle", "boot")
+
+
 @pytest.mark.promise("sessions")
 @pytest.mark.long
 def test_requests_of_another_session_are_not_heard(target, skin, line):
@@ -149,6 +187,22 @@ def test_the_wristband_refuses_heights_for_another_number_of_bubbles(skin, by):
     with pytest.raises(bs.BubbleskinError):
         raw_show(skin, [6000] * (skin.info.bubbles + by))
     assert skin.state().mode in ("venting", "idle")
+
+
+@pytest.mark.long
+def test_the_wristband_refuses_a_ramp_that_is_too_long(skin):
+    with pytest.raises(bs.DeviceRefused):
+        raw_show(skin, [6000] * skin.info.bubbles, over_ms=60001)
+    assert skin.state().mode in ("venting", "idle")
+
+
+@pytest.mark.long
+def test_a_new_session_has_not_subscribed_to_what_another_has(skin):
+    at_once(skin.link.call("SUBSCRIBE", (10,)))
+    at_once(skin.link.hello())
+    skin.link.telemetry.clear()
+    skin.sleep(0.5)
+    assert not skin.link.telemetry
 
 
 @pytest.mark.long

@@ -14,6 +14,7 @@ import bubbleskin as bs
 
 pytestmark = pytest.mark.timeout(60)
 
+no_pin = pytest.mark.not_on("micropython", "what runs the firmware there has no pin for an emergency stop")
 beyond_a_board = pytest.mark.not_on("board", "no board does that to itself")
 
 
@@ -38,12 +39,22 @@ def failing(skin):
     failed = set()
 
     def fail(part, bubble, how):
-        failed.add((part, bubble))
         skin.inject(part, bubble, how)
+        failed.add((part, bubble))
 
     yield fail
     for part, bubble in failed:
         skin.inject(part, bubble, "healthy")
+    skin.vent()
+    skin.sleep(1.0)
+    skin.clear_faults()
+
+
+@pytest.fixture
+def press(skin):
+    """`press(pressed)`: the emergency stop of a simulated board; released in the end."""
+    yield lambda pressed: skin.simulated.inject("estop", 0, float(pressed))
+    skin.simulated.inject("estop", 0, 0.0)
     skin.vent()
     skin.sleep(1.0)
     skin.clear_faults()
@@ -109,6 +120,9 @@ def test_pressure_and_time_have_a_budget(skin):
         assert skin.faults() == {1: ("budget",)}, "those at low pressure have their budget left"
         skin.sleep(0.5)
         assert skin.state().pressure_kpa[1] < 5
+        skin.sleep(1.0)
+        skin.clear_faults()
+        assert skin.faults() == {}, "without pressure it recovers"
     finally:
         skin.configure(budget_kpa_s=before)
         skin.vent()
@@ -160,6 +174,43 @@ def test_the_ill_bubble_is_isolated_and_only_that(skin, failing, what, record_pr
     others = np.arange(n) != ill
     if skin.state().mode == "active" and skin.simulated:
         assert skin.simulated.alone_mm[others] == pytest.approx(9.0, abs=0.3)
+
+
+@pytest.mark.promise("faults-found")
+@pytest.mark.fails_on_purpose
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("part", "how", "first", "then", "name"),
+    [
+        ("fill valve", "off", 5.0, 9.0, "no_air"),
+        pytest.param("vent valve", "stuck", 9.0, 5.0, "valve_stuck", marks=beyond_a_board),
+    ],
+)
+def test_a_valve_that_does_not_open_is_found_when_it_is_asked_to(skin, failing, part, how, first, then, name):
+    n, ill = skin.info.bubbles, 0
+    skin.show(np.full(n, first))
+    failing(part, ill, how)
+    skin.sleep(0.5)
+    assert skin.faults() == {}, "it is not asked for anything"
+    skin.show(np.full(n, then), wait=False)
+    skin.sleep(0.3)
+    assert list(skin.faults()) == [ill]
+    assert name in skin.faults()[ill]
+
+
+@pytest.mark.promise("faults-found")
+@beyond_a_board
+@pytest.mark.long
+def test_a_leak_that_control_makes_up_for_is_found_by_the_air_that_it_takes(skin, failing):
+    ill = 2
+    skin.show(np.full(skin.info.bubbles, 10.5))
+    failing("bubble", ill, "wrong")
+    skin.simulated.inject("leak", ill, 9e-6)  # 200 µJ/ms at this height
+    for _ in range(15):
+        skin.sleep(0.1)
+        if skin.faults():
+            break
+    assert skin.faults() == {ill: ("leak",)}
 
 
 @pytest.mark.promise("fault-stays")
@@ -243,24 +294,40 @@ def test_failures_on_request_are_permitted_only_while_all_is_vented(skin):
 
 @pytest.mark.promise("emergency-stop")
 @beyond_a_board
-@pytest.mark.not_on("micropython", "what runs the firmware there has no pin for an emergency stop")
-def test_the_emergency_stop_vents_and_nothing_but_clear_leaves_it(skin):
+@no_pin
+def test_the_emergency_stop_vents_whatever_is_asked(skin, press):
     n = skin.info.bubbles
     skin.show(np.full(n, 8.0))
-    skin.simulated.inject("estop", 0, 1)
-    try:
-        skin.sleep(0.6)
-        assert skin.state().mode == "stopped"
-        assert np.abs(skin.state().pressure_kpa).max() < 1.0
-        with pytest.raises(bs.BubbleskinError):
-            skin.show(np.full(n, 6.0))
-    finally:
-        skin.simulated.inject("estop", 0, 0)
+    press(True)
+    skin.sleep(0.1)
+    assert skin.state().mode == "stopped"
+    assert skin.health().board_faults == ("emergency_stop",)
     skin.sleep(1.0)
-    assert skin.state().mode == "stopped", "released, and not acknowledged"
+    assert np.abs(skin.state().pressure_kpa).max() < 1.0
+    with pytest.raises(bs.DeviceRefused):
+        skin.show(np.full(n, 6.0), wait=False)
+    assert skin.state().mode == "stopped"
+
+
+@pytest.mark.promise("emergency-stop")
+@beyond_a_board
+@no_pin
+@pytest.mark.long
+def test_the_emergency_stop_cannot_be_cleared_while_it_is_pressed(skin, press):
+    n = skin.info.bubbles
+    press(True)
+    skin.sleep(1.5)
+    pressed = skin.fault_log()[-1]
     skin.clear_faults()
-    skin.show(np.full(n, 6.0), wait=False)
-    assert skin.state().mode == "active"
+    assert skin.fault_log()[-1] == pressed, "neither acknowledged nor, a tick later, there again"
+    assert skin.state().mode == "stopped"
+    assert skin.health().board_faults == ("emergency_stop",)
+    press(False)
+    skin.sleep(1.5)
+    assert skin.state().mode == "stopped", "releasing it starts nothing, nor does what was cleared before"
+    skin.clear_faults()
+    assert skin.state().mode in ("venting", "idle")
+    skin.show(np.full(n, 6.0))
 
 
 @pytest.mark.promise("stuck-fill-valve")

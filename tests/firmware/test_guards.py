@@ -120,6 +120,15 @@ def test_acknowledging_one_fault_forgets_no_other(rig):
     assert (rig.app.bubbles.faults(1), rig.app.faults.board) == (0, faults.VALVE_CHIP)
 
 
+def test_what_went_wrong_before_the_emergency_stop_can_be_acknowledged_while_it_is_pressed(rig):
+    rig.hal.counts[0] = 0
+    rig.tick(3)
+    press(rig, True)
+    newest = rig.app.faults.log.newest
+    rig.ask("CLEAR")
+    assert rig.app.faults.log.acknowledged == newest - 1
+
+
 # Leaks, in a plant.
 
 

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bubble_firmware.app import App
 from bubble_firmware.device_clock import LATEST, DeviceClock
 from bubble_firmware.safety import state as safety
 from bubble_firmware.safety.fault_log import FaultLog
@@ -61,6 +62,17 @@ def test_whatever_happens_the_emergency_stop_wins_and_a_fault_is_cleared_before_
         if event in (safety.VENT, safety.HOST_SILENT, safety.EXCEPTION):
             assert state.control_mode == 0
     assert state.mode in {number for number, _, _ in modes.MODES}
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_only_a_clear_ends_an_emergency_stop(event):
+    class Board:
+        TICK_US = 5000
+
+    state = safety.SafetyState(Board)
+    state.handle(safety.ESTOP)
+    assert state.handle(event) == (event == safety.CLEAR)
+    assert state.mode == (MODE_VENTING if event == safety.CLEAR else STOPPED)
 
 
 REQUESTS = ("SHOW", "STOP", "VENT", "CLEAR", "FAULTS_ACK", "PING", "silence", "long silence", "tick")
@@ -177,6 +189,18 @@ def test_a_host_that_is_refused_keeps_nothing_alive(rig7, greeting):
     assert vented(rig7)
     refusals = [message for message in rig7.heard() if message.id == messages.ERROR]
     assert len(refusals) > 50
+
+
+def test_a_host_without_a_session_keeps_nothing_alive(rig7):
+    rig7.app = App(rig7.board, rig7.hal)
+    key = wire.session_key(rig7.hal.boot_id, 0)
+    rig7.hal.to_device += wire.encode("SHOW", 1, (0,), [(9000,)] * 7, key)
+    for tick in range(3_000_000 // rig7.board.TICK_US):
+        if not tick % 10:
+            rig7.hal.to_device += wire.encode("PING", 0, (0,), (), key)
+        rig7.app.tick()
+    assert rig7.app.safety.control_mode == 0
+    assert vented(rig7)
 
 
 def test_a_host_that_has_a_session_keeps_alive_by_its_greeting_too(rig7):

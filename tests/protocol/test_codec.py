@@ -152,3 +152,22 @@ def test_what_decides_the_bytes_decides_the_schemas_crc(monkeypatch):
     assert changed(lambda data: data[1].__setitem__(2, data[1][2][::-1]))
     assert not changed(lambda data: data[3].__setitem__(4, "said otherwise"))
     assert not changed(lambda data: field(data, unit="m", high=5))
+
+
+@every_message
+def test_the_first_value_beyond_its_limit_is_named_and_none_at_it(message):
+    count = min(room(message), 3) if message.stride else 0
+    fixed, stride = message.fixed_values, message.stride_values
+    total = fixed + count * stride
+    none = [None] * (fixed + stride)
+    assert message.limits is None or len(message.limits) == 2
+    lows, highs = message.limits or (none, none)
+    for ends, others, beyond in ((lows, highs, -1), (highs, lows, 1)):
+        at = [place if place < fixed else fixed + (place - fixed) % stride for place in range(total)]
+        values = array("i", [others[place] or 0 if ends[place] is None else ends[place] for place in at])
+        assert message.first_out_of_range(values, count) == -1
+        for place in range(total):
+            if ends[at[place]] is not None:
+                values[place] += beyond
+                assert message.first_out_of_range(values, count) == place
+                values[place] -= beyond

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from bubbleskin.bench.clock import LAWS, history, uniform
 from bubbleskin.errors import LinkError
-from bubbleskin.link.clock import DRIFT, WANDER, Clock
+from bubbleskin.link.clock import DRIFT, WANDER, Clock, DeviceTicks
+from bubbleskin.link.message import Message
 
 TICK = 0.005
 
@@ -151,3 +152,15 @@ def test_a_drift_that_wanders_as_fast_as_is_allowed_contradicts_nothing(sign):
     assert clock.pings >= 590, "nothing was taken for a reboot"
     for later in (0.0, 10.0, 100.0, 600.0):
         assert abs(clock.at(host.now + later) - truth(host.now + later)) <= clock.uncertainty_at(host.now + later)
+
+
+def test_ticks_of_messages_count_on_and_one_that_was_overtaken_is_of_before():
+    wrap = 1 << 30
+    told = [wrap - 2, 3, wrap - 1, 5]
+    unwrapped = []
+    ticks = DeviceTicks()
+    for number in told:
+        message = Message(1, 0, {"ticks": number}, {})
+        ticks.unwrap(message)
+        unwrapped.append(message["ticks"])
+    assert unwrapped == [wrap - 2, wrap + 3, wrap - 1, wrap + 5]
