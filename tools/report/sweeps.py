@@ -32,8 +32,12 @@ WAIT_S = 3600.0
 
 @contextmanager
 def dask() -> Iterator[Executor]:
-    """A scheduler and two workers on this computer, without a dashboard."""
-    from distributed import Client, LocalCluster
+    """A scheduler and two workers on this computer, without a dashboard, and as docs/sweeps.md says to start workers."""
+    os.environ |= {
+        "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
+        "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+    }
+    from distributed import Client, LocalCluster  # which reads them now
 
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, protocol="tcp") as cluster,
