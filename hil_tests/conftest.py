@@ -1,6 +1,8 @@
 """One suite, every target: simulated, MicroPython in a subprocess, a real board. Through the public SDK only."""
 
+import base64
 import contextlib
+import io
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -42,6 +44,7 @@ NOT_PERMITTED = "a real board is made to fail only where --permit-failures says 
 LONG = "an emulated second takes twenty"
 
 _SKIN = pytest.StashKey[bs.Skin]()
+_TRACE = pytest.StashKey["Trace"]()
 
 
 def pytest_configure(config):
@@ -131,6 +134,8 @@ def pytest_runtest_makereport(item):
     if report.when == "call" and report.failed:
         if skin := item.stash.get(_SKIN, None):
             report.sections.append(("What the wristband says", _said(skin)))
+            if item.config.pluginmanager.hasplugin("html"):
+                report.extras = _pictures(skin, item.stash.get(_TRACE, None))
         if item.path.stem == ORDER[0] and "://" not in _target(item):
             item.session.shouldfail = "A first move has failed, so this board is not asked for more. Mend that first."
     return report
@@ -146,6 +151,32 @@ def _said(skin: bs.Skin) -> str:
             said = str(error)
         lines += [str(each) for each in said] if isinstance(said, list) else [str(said)]
     return "\n".join(lines)
+
+
+def _pictures(skin: bs.Skin, trace: "Trace | None") -> list[object]:
+    """For the report that `--html` writes: what stands there, and what was watched last."""
+    from pytest_html import extras
+
+    pictures = []
+    with contextlib.suppress(bs.BubbleskinError):
+        pictures.append(skin._repr_png_())
+    if trace is not None:
+        pictures.append(_drawn(trace))
+    return [extras.png(base64.b64encode(picture).decode()) for picture in pictures if picture]
+
+
+def _drawn(trace: "Trace") -> bytes:
+    """Heights over time, a line for each bubble, as a PNG."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 3.0), layout="constrained")
+    axes = figure.add_subplot(xlabel="s since the watch began", ylabel="height, mm")
+    for bubble, height in enumerate(trace.height_mm.T):
+        axes.plot(trace.time, height, label=str(bubble))
+    axes.legend(title="bubble", fontsize="small", ncols=2, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=120)
+    return drawn.getvalue()
 
 
 def connect(target: str) -> bs.Skin:
@@ -200,7 +231,34 @@ class Trace:
 
 
 @pytest.fixture
-def watch(skin: bs.Skin) -> Callable[[float], Trace]:
+def board(skin: bs.Skin):
+    """The simulated board behind `skin`, which knows the truth; a test that asks for it is skipped on a real one."""
+    if not skin.simulated:
+        pytest.skip("a real board does not know the truth")
+    return skin.simulated
+
+
+@pytest.fixture
+def failing(skin: bs.Skin) -> Iterator[Callable[[str, int, str], None]]:
+    """`failing(part, bubble, how)`: make a part fail, or mend it; mended in the end. With the mark `fails_on_purpose`."""
+    if not skin.simulated:
+        skin.permit_injection()
+    failed = set()
+
+    def fail(part: str, bubble: int, how: str) -> None:
+        skin.inject(part, bubble, how)
+        failed.add((part, bubble))
+
+    yield fail
+    for part, bubble in failed:
+        skin.inject(part, bubble, "healthy")
+    skin.vent()
+    skin.sleep(1.0)
+    skin.clear_faults()
+
+
+@pytest.fixture
+def watch(skin: bs.Skin, request: pytest.FixtureRequest) -> Callable[[float], Trace]:
     """`watch(seconds)`: look at the bubbles for so long, from now on."""
 
     def true_heights(board, seconds: float) -> Trace:
@@ -225,7 +283,12 @@ def watch(skin: bs.Skin) -> Callable[[float], Trace]:
                     return Trace(np.array(times), np.array(heights), None)
         raise AssertionError("telemetry has ended")
 
-    return lambda seconds: true_heights(skin.simulated, seconds) if skin.simulated else estimates(seconds)
+    def watched(seconds: float) -> Trace:
+        trace = true_heights(skin.simulated, seconds) if skin.simulated else estimates(seconds)
+        request.node.stash[_TRACE] = trace
+        return trace
+
+    return watched
 
 
 @pytest.fixture

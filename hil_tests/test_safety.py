@@ -32,25 +32,6 @@ def silence(skin, monkeypatch):
 
 
 @pytest.fixture
-def failing(skin):
-    """`failing(part, bubble, how)`: make a part fail, or mend it; mended in the end."""
-    if not skin.simulated:
-        skin.permit_injection()
-    failed = set()
-
-    def fail(part, bubble, how):
-        skin.inject(part, bubble, how)
-        failed.add((part, bubble))
-
-    yield fail
-    for part, bubble in failed:
-        skin.inject(part, bubble, "healthy")
-    skin.vent()
-    skin.sleep(1.0)
-    skin.clear_faults()
-
-
-@pytest.fixture
 def press(skin):
     """`press(pressed)`: the emergency stop of a simulated board; released in the end."""
     yield lambda pressed: skin.simulated.inject("estop", 0, float(pressed))

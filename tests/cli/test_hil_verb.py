@@ -39,10 +39,12 @@ def test_a_wristband_that_is_not_there_is_said(tmp_path):
 @pytest.mark.slow
 def test_a_failure_stands_beside_what_the_wristband_says(tmp_path):
     # A plant whose bubble 1 is half a table's stiffness off cannot be known to be where it is asked.
-    done = run("--device", f"{TARGET}&spread=0.4&seed=3", "--only", "all_rise_high or extremes", cwd=tmp_path)
+    device = f"{TARGET}&spread=0.4&seed=3"
+    done = run("--device", device, "--only", "all_rise_high or extremes", "--html", "r.html", cwd=tmp_path)
     assert done.returncode == 1
     assert "What the wristband says" in done.stdout
     assert "<Health" in done.stdout
+    assert "data:image/png;base64," in (tmp_path / "r.html").read_text(encoding="utf-8"), "the shape that stood there"
 
 
 @pytest.mark.medium

@@ -2,8 +2,8 @@
 
 import ast
 
-DOCUMENTED = {"_asdict", "_fields", "_replace", "_exit", "_getframe"}
-"""Public in spite of their underscore: of named tuples, `os` and `sys`."""
+DOCUMENTED = {"_asdict", "_fields", "_replace", "_exit", "_getframe", "_repr_png_"}
+"""Public in spite of their underscore: of named tuples, `os` and `sys`, and what notebooks ask for."""
 
 
 def is_private(name: str) -> bool:

@@ -99,7 +99,7 @@ def test_it_is_identical_on_the_chip(tmp_path):
 def test_a_change_of_one_tick_is_named_at_its_tick(trouble, other_version, command):
     """A valve that is open for 1 µs more, in one tick."""
     guilty = "        if self.clock.ticks == 333:\n            bubbles.pulses[6] += 1\n"
-    place = "        self.fault_monitor.block_backflow(supply.pressure_pa)\n"
+    place = "        monitor.block_backflow(supply.pressure_pa)\n"
     folder = other_version("app.py", place, place + guilty)
     found = bs.replay(trouble, firmware=folder)
     assert not found.identical

@@ -305,7 +305,7 @@ def test_permission_ends_with_a_restart_and_on_request(real):
     [
         (("fill valve", 3, "stuck"), "it can make it off, missing, and healthy again"),
         (("vent valve", 3, "stuck"), "it can make it off, missing"),
-        (("tube", 3, "off"), "simulated"),
+        (("tube", 3, "off"), "Simulated"),
         (("link", 0, "off"), "sim://"),
         (("sensor", 7, "missing"), "0 to 6"),
         (("sensor", 3, "green"), "it can be off, stuck"),
