@@ -52,3 +52,24 @@ def test_what_would_be_tried_is_listed(tmp_path):
     done = run("--list", "--only", "safety", cwd=tmp_path)
     assert done.returncode == 0
     assert "test_a_shape_is_vented_when_the_host_stays_silent" in done.stdout
+
+
+@pytest.mark.medium
+def test_a_hardware_map_names_more_devices(tmp_path):
+    (tmp_path / "lab.toml").write_text(
+        '[devices]\nleft = "sim://wristband7"\nright = "sim://wristband19"\n', encoding="utf-8"
+    )
+    done = run("--list", "--only", "first_bubble", "--map", "lab.toml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "[sim://wristband7]" in done.stdout
+    assert "[sim://wristband19]" in done.stdout
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("text", ["", "[devices]\n", "devices = 3\n", "[devices]\nleft = 3\n"])
+def test_a_hardware_map_without_devices_is_refused_in_a_sentence(tmp_path, text):
+    (tmp_path / "lab.toml").write_text(text, encoding="utf-8")
+    done = run("--map", "lab.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "[devices]" in done.stderr

@@ -9,7 +9,8 @@ import click
 
 import bubbleskin
 from bubbleskin import boards
-from bubbleskin.errors import BubbleskinError
+from bubbleskin.errors import BubbleskinError, InvalidInput
+from bubbleskin.files import parse_toml, read_text
 
 INSTALL = "pip install 'bubbleskin[hil]'"
 _NEEDED = ("pytest", "pytest_timeout", "pytest_html")
@@ -26,6 +27,13 @@ _NEEDED = ("pytest", "pytest_timeout", "pytest_html")
     help=f"A port or URL; several times for several targets in one run.  [default: sim://{boards.DEFAULT}]",
 )
 @click.option(
+    "--map",
+    "hardware",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="A .toml file of more devices: in [devices] a name and a port or URL each.",
+)
+@click.option(
     "--only", metavar="WORDS", help="Tests whose names have these words, such as 'safety' or 'line and not vent'."
 )
 @click.option(
@@ -40,7 +48,13 @@ _NEEDED = ("pytest", "pytest_timeout", "pytest_html")
 )
 @click.option("--list", "names", is_flag=True, help="Say what would be tried, and touch nothing.")
 def hil(
-    devices: tuple[str, ...], only: str | None, html: Path | None, junit: Path | None, failures: bool, names: bool
+    devices: tuple[str, ...],
+    hardware: Path | None,
+    only: str | None,
+    html: Path | None,
+    junit: Path | None,
+    failures: bool,
+    names: bool,
 ) -> NoReturn:
     """Try on a device what docs/safety.md, link.md, store.md and control.md promise.
 
@@ -63,6 +77,8 @@ def hil(
         "-ra",
         "--import-mode=importlib",
     ]
+    if hardware is not None:
+        devices += mapped(hardware)
     for device in devices or (f"sim://{boards.DEFAULT}",):
         arguments += ["--target", device]
     arguments += ["-k", only] if only else []
@@ -71,6 +87,16 @@ def hil(
     arguments += ["--permit-failures"] if failures else []
     arguments += ["--collect-only", "-q"] if names else []
     raise SystemExit(pytest.main(arguments))
+
+
+def mapped(path: Path) -> tuple[str, ...]:
+    """The devices that a hardware map names, in its order; `InvalidInput` where it is none."""
+    found = parse_toml(read_text(path, "a hardware map"), str(path)).get("devices")
+    if not isinstance(found, dict) or not found or not all(isinstance(url, str) for url in found.values()):
+        raise InvalidInput(
+            f'{path} has no table [devices] of a name and a port or URL each, such as left = "/dev/ttyACM0".'
+        )
+    return tuple(found.values())
 
 
 def missing() -> list[str]:
