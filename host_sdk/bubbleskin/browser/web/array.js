@@ -212,7 +212,9 @@ export default {
       });
     },
     buildBubble(bubble) {
-      const group = make(this.layer, "g", { class: "bubble", role: "button", tabindex: bubble === this.chosen ? 0 : -1, "data-bubble": bubble });
+      const group = make(this.layer, "g", {
+        class: "bubble", role: "button", "aria-label": `Bubble ${bubble}`, tabindex: bubble === this.chosen ? 0 : -1, "data-bubble": bubble,
+      });
       const parts = { group, foot: make(this.plate, "ellipse") };
       for (const part of ["doubt", "ghost", "ball", "light", "foreseen"]) parts[part] = make(group, "circle", { class: part });
       parts.light.setAttribute("fill", `url(#${this.shade})`);
