@@ -267,6 +267,7 @@ def test_a_real_board_with_a_sensor_that_says_too_much_stands_lower(real):
     assert board.plant.height_mm[2] == pytest.approx(12.0, abs=0.2)
 
 
+@pytest.mark.medium
 def test_the_supply_of_a_real_board_fails_and_is_mended(real):
     skin, _ = real
     skin.permit_injection()
