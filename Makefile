@@ -1,4 +1,4 @@
-# make demo: see it. make test: every check that needs no hardware, some 35 minutes on two cores. make check: the quick ones, about one.
+# make demo: see it. make test: every check that needs no hardware, some 20 minutes on two cores. make check: the quick ones, about one.
 
 PYTHON ?= python3
 VENV := .venv
@@ -31,7 +31,7 @@ $(READY): pyproject.toml build.lock requirements.lock
 demo: setup ## a simulated wristband takes two shapes; ends with a picture
 	$(BIN)/bubbleskin demo
 
-test: setup lint generated micropython ## every check that needs no hardware, some 35 minutes
+test: setup lint generated micropython ## every check that needs no hardware, some 20 minutes
 	@echo "the everyday tests, 100 examples of each property; coverage, which makes them half as slow again, is of these"
 	$(BIN)/python -m pytest $(EVERYDAY) --cov --cov-report= --cov-fail-under=0
 	@echo "and of the slow tests of the SDK's rooms; its floor is one of both"
@@ -45,7 +45,7 @@ test: setup lint generated micropython ## every check that needs no hardware, so
 	@echo "the slow tests of all else that needs no emulated chip, 2,000 scenarios of the promises among them"
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "slow and not chip" $(COVERED:%=--ignore %)
 
-chip: setup micropython ## build the RP2040's firmware, run its tests and hil_tests on an emulated chip, 20 minutes
+chip: setup micropython ## build the RP2040's firmware, run its tests and hil_tests on an emulated chip, 12 minutes
 	$(BIN)/bubbleskin firmware build
 	$(BIN)/python -m pytest -n 2 -m "chip and not long"
 	$(BIN)/python -m pytest -n 2 hil_tests $(EMULATED)
