@@ -1,6 +1,7 @@
 """The request to fail on purpose: INJECT."""
 
 from bubble_firmware.hal.failing import FailingHal
+from bubble_firmware.handlers.vented import is_vented
 from bubble_firmware.link.reply import Handlers
 from bubble_protocol.mpy_compat import TYPE_CHECKING, const
 
@@ -13,13 +14,12 @@ if TYPE_CHECKING:
     from bubble_firmware.safety.state import SafetyState
 
 # [constants] bubble_protocol.schema.messages: INJECT
-# [constants] bubble_protocol.schema.errors: NO_ELEMENT NOT_PERMITTED NOT_VENTED OUT_OF_RANGE
+# [constants] bubble_protocol.schema.errors: NO_ELEMENT NOT_PERMITTED OUT_OF_RANGE
 # [constants] bubble_protocol.schema.injection: INJECTION
 # [constants] message INJECT as ASKED: *
 _INJECT = const(31)
 _NO_ELEMENT = const(255)
 _NOT_PERMITTED = const(13)
-_NOT_VENTED = const(15)
 _OUT_OF_RANGE = const(3)
 _INJECTION = const(0)
 _ASKED_FAILURE = const(0)
@@ -52,8 +52,7 @@ class InjectHandlers(Handlers):
         bubble = reply.values[_ASKED_BUBBLE]
         on = reply.values[_ASKED_ON]
         if failure == _INJECTION:
-            if on and self._safety.control_mode:
-                reply.refuse(_NOT_VENTED, _ASKED_FAILURE, _NO_ELEMENT, self._safety.mode, 0, 0)
+            if on and not is_vented(reply, self._safety):
                 return
             self._failing.mend()
             self._use(self._failing if on else self._hal)  # without permission nothing of this is in a tick's way

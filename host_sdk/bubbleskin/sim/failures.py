@@ -164,20 +164,17 @@ def on_board(part: str, number: int, how: object, bubbles: int) -> list[tuple[in
     """INJECTs that make a part of a real board with so many bubbles fail, or mend it. Raises `InvalidInput`."""
     part = part_of(part)
     number = checks.whole("number", number, 0, bubbles - 1) if part in OF_BUBBLES else 0
-    known = sorted({failure.board for failure in TABLE if failure.part == part and failure.board is not None})
-    mended = [(each, number, 0) for each in known]
+    own = {failure.how: failure.board for failure in TABLE if failure.part == part and failure.board is not None}
+    mended = [(board, number, 0) for board in sorted(set(own.values()))]
     if how == HEALTHY:
         return mended
-    failure = failure_of(part, how)
-    if failure.board is None:
-        can = [failure.how for failure in TABLE if failure.part == part and failure.board is not None]
-        own = (
-            f"make a {part} {failure.how}; it can make it {', '.join(can)}, and {HEALTHY} again"
-            if can
-            else f"make a {part} fail"
-        )
-        raise InvalidInput(f"A real board cannot {own}. Simulated ones can: sim://, micropython:// or rp2040://.")
-    return [*mended, (failure.board, number, 1)]
+    asked = failure_of(part, how).how
+    if asked in own:
+        return [*mended, (own[asked], number, 1)]
+    can = f"{asked}; it can make it {', '.join(own)}, and {HEALTHY} again" if own else "fail"
+    raise InvalidInput(
+        f"A real board cannot make a {part} {can}. Simulated ones can: sim://, micropython:// or rp2040://."
+    )
 
 
 def _refuse(part: str, how: object) -> NoReturn:
