@@ -252,6 +252,10 @@ def test_a_real_board_fails_only_with_permission_and_is_well_afterwards(run, sta
             assert_one_sentence(
                 run("inject", "sensor", "3", "missing", "--device", device), 2, "--permit", "nobody wears it"
             )
+            stuck = run("inject", "fill", "3", "stuck", "--device", device, "--permit")
+            assert_one_sentence(stuck, 2, "cannot make a fill valve stuck")
+            with bs.connect(device) as skin:
+                assert (skin.state().mode, skin.state().target_mm.max()) == ("idle", 5.0), "nothing has moved for that"
             for words, name in (("sensor 3 missing", "sensor_lost"), ("supply missing", "supply_lost")):
                 options = ["--device", device, "--permit", "--json", "--seconds", "1"]
                 status, out, err = run("inject", *words.split(), *options)

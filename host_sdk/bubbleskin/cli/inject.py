@@ -49,7 +49,7 @@ def inject(
         _print_table(json, [(each.part, each.how, each.meaning, each.board is not None) for each in TABLE])
         return
     part, number, how = _meant(words)
-    with connect(device) as skin, _permitted(skin, permit):
+    with connect(device) as skin, _permitted(skin, permit, part, number, how):
         skin.show([height] * skin.info.bubbles)
         found = _watched(skin, lambda: skin.inject(part, number, how), height, seconds)
     if json:
@@ -79,8 +79,10 @@ def _meant(words: tuple[str, ...]) -> tuple[str, int, str]:
 
 
 @contextlib.contextmanager
-def _permitted(skin: "Skin", permit: bool) -> Iterator[None]:
-    """A real board needs permission, and loses it in the end."""
+def _permitted(skin: "Skin", permit: bool, part: str, number: int, how: str) -> Iterator[None]:
+    """A real board needs permission, and loses it in the end; what it cannot do is refused before anything moves."""
+    from bubbleskin.sim.failures import on_board
+
     if skin.simulated is not None:
         yield
         return
@@ -88,6 +90,7 @@ def _permitted(skin: "Skin", permit: bool) -> Iterator[None]:
         raise InvalidInput(
             f"{skin.link.transport.name} is a real board: with --permit it makes a part of itself fail, while nobody wears it."
         )
+    on_board(part, number, how, skin.info.bubbles)
     skin.vent()
     skin.permit_injection()
     try:
