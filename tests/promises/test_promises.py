@@ -13,8 +13,7 @@ SHARES = 8
 """Tests that the scenarios are shared out to, each with other ones, so that they can run beside each other."""
 FEW = 5
 
-
-@pytest.mark.promise(
+of_the_judge = pytest.mark.promise(
     "pressure-limit",
     "height-limit",
     "reservoir-limit",
@@ -24,21 +23,15 @@ FEW = 5
     "isolation",
     "fault-stays",
 )
+
+
+@of_the_judge
 @pytest.mark.medium
 def test_promises_are_kept(look):
     look(FEW)
 
 
-@pytest.mark.promise(
-    "pressure-limit",
-    "height-limit",
-    "reservoir-limit",
-    "silence",
-    "emergency-stop",
-    "fill-valve-time",
-    "isolation",
-    "fault-stays",
-)
+@of_the_judge
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("share", range(1, SHARES + 1))
